@@ -1,7 +1,8 @@
 """Measure opening, meshing and memory of large scans against plain SimpleITK and VTK, in one interleaved run.
 
 Run from the top of a checkout: ``python benchmarks/big_scans.py [CASE ...] [--runs 3] [--folder DIR]``. It
-needs 4 GB of disk, and no display. Without a case it does all of them; ``--list`` names them.
+needs 4 GB of disk, and no display. Without a case it does all of them; ``--list`` names them. ``--types``
+prints the memory that a surface takes by type of voxel instead.
 
 Every figure is CPU seconds of a process of its own, all threads together, without imports; ours and the
 peer's take turns, and the median counts. Memory is the peak of anonymous and shared memory over that after
@@ -65,7 +66,16 @@ CASES = {
     "clicks": Case("100 clicks refined, of 30 ms each", HEAD, "our_clicks", "waiting", 1.0),
     "skimage": Case("scikit-image's marching cubes", HEAD, "skimage", "our_mesh", 5.0, True),
     "pyvista": Case("pyvista's default contour", HEAD, "pyvista", "our_mesh", 3.0, True),
+    "pyvista-same": Case("pyvista, normals, no scalars", HEAD, "pyvista_same", "our_mesh", 3.0, True),
+    "mesh-edges": Case("edges: surface for mesh and save", 512, "our_mesh", "flying_edges", 1.15),
+    "islands-edges": Case("edges: islands dropped", 512, "our_islands", "flying_edges", 1.3),
+    "pick-edges": Case("edges: and search structure", 512, "our_first_pick", "flying_edges", 1.3),
+    "skimage-edges": Case("edges: scikit-image", 512, "skimage", "our_mesh", 5.0, True),
+    "pyvista-edges": Case("edges: pyvista's default", 512, "pyvista", "our_mesh", 3.0, True),
+    "same-edges": Case("edges: pyvista, normals", 512, "pyvista_same", "our_mesh", 3.0, True),
 }
+
+TYPES = ("uint8", "int16", "uint16", "int32", "uint32", "int64", "float32", "float64")
 
 
 # What is measured, each in a process of its own: the imports, then the work
@@ -207,6 +217,12 @@ def _volume(path: str) -> Any:
     return read_volume(path, mapped=False)
 
 
+def _threshold(path: str) -> float:
+    """Return where bone begins in one of the scans."""
+    name = Path(path).stem
+    return HEAD_THRESHOLD if name.startswith("head") else THRESHOLD / (8 if name.endswith("uint8") else 1)
+
+
 def our_mesh(path: str) -> Callable[[], Any]:
     """Make the whole surface at full resolution, as for a file."""
     return _our_surface(path, smallest_mm=0.0)
@@ -228,7 +244,7 @@ def _our_surface(path: str, **how: float) -> Callable[[], Any]:
 
     volume = _volume(path)
     extract_isosurface(_cube_and_speck(), THRESHOLD)
-    return lambda: extract_isosurface(volume, HEAD_THRESHOLD, **how)
+    return lambda: extract_isosurface(volume, _threshold(path), **how)
 
 
 def flying_edges(path: str) -> Callable[[], Any]:
@@ -248,7 +264,7 @@ def flying_edges(path: str) -> Callable[[], Any]:
     def work() -> Any:
         contour = vtkFlyingEdges3D()
         contour.SetInputData(image)
-        contour.SetValue(0, HEAD_THRESHOLD - 0.5)
+        contour.SetValue(0, _threshold(path) - 0.5)
         contour.ComputeScalarsOff()
         contour.Update()
         return contour.GetOutput()
@@ -262,13 +278,19 @@ def skimage(path: str) -> Callable[[], Any]:
 
     array, find = _volume(path).array.astype(np.float32), measure.marching_cubes  # its own type
     find(np.asarray(array[:24, :24, :24]), float(array[:24, :24, :24].mean()))
-    return lambda: find(array, HEAD_THRESHOLD - 0.5)  # type: ignore[no-untyped-call]
+    return lambda: find(array, _threshold(path) - 0.5)  # type: ignore[no-untyped-call]
 
 
 def pyvista(path: str) -> Callable[[], Any]:
-    """`pyvista.ImageData.contour` as it is by default."""
+    """`pyvista.ImageData.contour` as it is by default: without normals, with scalars."""
     image = _volume(path).to_pyvista()
-    return lambda: image.contour([HEAD_THRESHOLD - 0.5])
+    return lambda: image.contour([_threshold(path) - 0.5])
+
+
+def pyvista_same(path: str) -> Callable[[], Any]:
+    """Let it make what ours makes: with normals, without scalars."""
+    image = _volume(path).to_pyvista()
+    return lambda: image.contour([_threshold(path) - 0.5], compute_normals=True, compute_scalars=False)
 
 
 def our_clicks(path: str) -> Callable[[], Any]:
@@ -320,8 +342,10 @@ def measured(name: str, path: str) -> dict[str, float]:
     watcher.join()
     cpu, seconds = _cpu() - used, time.perf_counter() - begun
     peak[0] = max(peak[0], anonymous_mb())
+    mesh = getattr(kept, "mesh", None)
+    mesh_mb = 0.0 if mesh is None else mesh.GetActualMemorySize() * 1024 / MB
     del kept
-    return {"cpu": cpu, "seconds": seconds, "mb": peak[0] - before}
+    return {"cpu": cpu, "seconds": seconds, "mb": peak[0] - before, "mesh_mb": mesh_mb}
 
 
 def _cpu() -> float:
@@ -371,6 +395,33 @@ def scan_file(folder: Path, n: int) -> Path:
     return path
 
 
+def typed_file(folder: Path, name: str) -> Path:
+    """Write the scan of 256³ voxels as voxels of another type, and return its path."""
+    plain = scan_file(folder, 256)
+    path = folder / f"scan-256-{name}.nrrd"
+    head, _, voxels = plain.read_bytes().partition(b"\n\n")
+    values = np.frombuffer(voxels, "<u2") // (8 if name == "uint8" else 1)
+    nrrd = {"float32": "float", "float64": "double"}.get(name, name)
+    header = head.replace(b"type: uint16", f"type: {nrrd}".encode())
+    path.write_bytes(header + b"\n\n" + values.astype(name).tobytes())
+    return path
+
+
+def show_types(folder: Path) -> None:
+    """Print the memory above scan and mesh that a surface takes at most, by type of voxel."""
+    print(f"{'voxels':<10}{'scan, MB':>10}{'mesh, MB':>10}{'peak, MB':>10}{'of scan':>10}{'besides':>10}")
+    for name in TYPES:
+        path = typed_file(folder, name)
+        scan, found = path.stat().st_size / MB, in_process("our_islands", path)
+        besides = found["mb"] - found["mesh_mb"]
+        print(
+            f"{name:<10}{scan:>10.0f}{found['mesh_mb']:>10.0f}{found['mb']:>10.0f}"
+            f"{found['mb'] / scan:>10.2f}{besides:>10.0f}",
+            flush=True,
+        )
+        path.unlink()
+
+
 def _head(path: Path) -> Path:
     import SimpleITK
 
@@ -402,7 +453,7 @@ def show(name: str, folder: Path, runs: int) -> None:
     mb, their_mb = (float(np.median([run["mb"] for run in found])) for found in (ours, peers))
     goal = f"{'>=' if case.at_least else '<='} {case.goal:g}"
     print(
-        f"{name:<12}{case.title:<34}{mine:>8.2f}{peer:>8.2f}{mine / peer:>8.2f}{goal:>9}"
+        f"{name:<15}{case.title:<34}{mine:>8.2f}{peer:>8.2f}{mine / peer:>8.2f}{goal:>9}"
         f"{mb:>9.0f}{mb / volume_mb:>8.2f}{their_mb / volume_mb:>8.2f}",
         flush=True,
     )
@@ -414,6 +465,7 @@ def main() -> None:
     parser.add_argument("cases", nargs="*", default=[], help="which; all by default")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--folder", type=Path, help="where the scans are kept; thrown away by default")
+    parser.add_argument("--types", action="store_true", help="memory of a surface, by type of voxel")
     parser.add_argument("--list", action="store_true", help="name the cases")
     parser.add_argument("--do", help=argparse.SUPPRESS)
     parser.add_argument("--file", help=argparse.SUPPRESS)
@@ -422,12 +474,15 @@ def main() -> None:
         print(json.dumps(measured(options.do, options.file)))
         return
     if options.list:
-        print(*(f"{name:<12}{case.title}" for name, case in CASES.items()), sep="\n")
+        print(*(f"{name:<15}{case.title}" for name, case in CASES.items()), sep="\n")
         return
     with tempfile.TemporaryDirectory() as thrown_away:
         folder = options.folder or Path(thrown_away)
+        if options.types:
+            show_types(folder)
+            return
         print(f"{os.cpu_count()} cores; CPU seconds, median of {options.runs}")
-        print(f"{'':<46}{'ours':>8}{'peer':>8}{'ratio':>8}{'goal':>9}{'MB':>9}{'of scan':>8}{'peer':>8}")
+        print(f"{'':<49}{'ours':>8}{'peer':>8}{'ratio':>8}{'goal':>9}{'MB':>9}{'of scan':>8}{'peer':>8}")
         for name in options.cases or CASES:
             show(name, folder, options.runs)
 

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 import numpy as np  # noqa: E402
-from big_scans import THRESHOLD, scan_file  # noqa: E402
+from big_scans import SPACING, THRESHOLD, scan_file  # noqa: E402
 from hands import rest  # noqa: E402
 from qtpy.QtCore import Qt, QTimer  # noqa: E402
 from qtpy.QtTest import QTest  # noqa: E402
@@ -33,6 +33,8 @@ from gp_labeler.views.main_window import MainWindow  # noqa: E402
 
 ROUNDS = 3
 GOAL_MS = 50.0
+LEAST_MM = 10.0
+"""A scan that is shorter than a head could be is asked about."""
 
 FIRST_PAINT = """
 from gp_labeler.views.application import make_window
@@ -67,7 +69,7 @@ def main() -> None:
         window.show()
         QTest.qWaitForWindowExposed(window)
         rest_of_start(window)
-        report_opening(window, path)
+        report_opening(window, path, options.voxels)
         window.workspace.document.abandon()
         window.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
         window.close()
@@ -100,7 +102,7 @@ def rest_of_start(window: MainWindow) -> None:
     QTest.qWait(200)
 
 
-def report_opening(window: MainWindow, path: Path) -> None:
+def report_opening(window: MainWindow, path: Path, voxels: int) -> None:
     """Open a scan that stays in its file, mesh it, and print the longest gaps between two answers."""
     readers.MAPPED_FROM = 1 << 20
     gaps, last = [], [time.thread_time(), time.perf_counter()]
@@ -115,7 +117,7 @@ def report_opening(window: MainWindow, path: Path) -> None:
     timer.timeout.connect(answer)
     timer.start()
     scan = window.workspace.scan
-    scan.open(path, spacing=0.03)
+    scan.open(path, spacing=max(SPACING, LEAST_MM / voxels))
     while scan.volume is None or window.workspace.jobs.running:
         QTest.qWait(10)
     scan.set_threshold(THRESHOLD)
