@@ -299,29 +299,35 @@ def test_every_voxel_type_is_meshed(dtype: type) -> None:
 
 
 @pytest.mark.parametrize(
-    ("dtype", "offset"),
+    ("dtype", "offset", "lowest"),
     [
-        ("int8", -100),
-        ("uint8", 0),
-        ("int16", -32768),
-        ("uint16", 60000),
-        ("int32", -(2**31)),
-        ("uint32", 2**32 - 2000),
-        ("int64", -(2**40)),
-        ("uint64", 2**45),
-        ("float32", -4096.0),
-        ("float64", 1e11),
+        ("int8", -100, 0),
+        ("uint8", 0, 0),
+        ("int16", -32768, 0),
+        ("uint16", 60000, 0),
+        ("int32", -(2**31), 0),
+        ("int32", 50, -100_000),
+        ("uint32", 2**32 - 2000, 0),
+        ("uint32", 2**31, -(2**31)),
+        ("int64", -(2**40), 0),
+        ("uint64", 2**45, 0),
+        ("uint64", 2**45, -100_000),
+        ("float32", -4096.0, 0),
+        ("float64", 1e11, 0),
     ],
 )
 @pytest.mark.parametrize("stride", [1, 2])
-def test_the_surface_is_right_for_every_voxel_type(dtype: str, offset: float, stride: int) -> None:
-    """Wide types hold differences that flying edges, and float32, would lose."""
+def test_the_surface_is_right_for_every_voxel_type(
+    dtype: str, offset: float, lowest: int, stride: int
+) -> None:
+    """Wide types hold differences that flying edges, and float32, would lose; some span a wide range."""
     from skimage.measure import marching_cubes
 
     shape = ball(np.eye(3)).array.astype(np.float64)
     steps = np.clip(np.rint(30 * shape), -100, 100) + 100
     steps = np.rint(steps * (1.0 if dtype in ("int8", "uint8") else 7.0))
-    values = (steps.astype(dtype) + np.array(offset).astype(dtype)).astype(dtype)
+    steps[0, 0, 0] += lowest
+    values = (steps.astype(np.int64).astype(dtype) + np.array(offset).astype(dtype)).astype(dtype)
     level = 99.5 if dtype in ("int8", "uint8") else 699.5
     threshold = level + 0.5 + offset if np.dtype(dtype).kind in "iu" else float(level + offset)
     surface = extract_isosurface(Volume(values, np.eye(4)), threshold, smallest_mm=0, stride=stride)
