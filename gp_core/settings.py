@@ -19,6 +19,9 @@ from gp_core.errors import GpError
 
 __all__ = ["KEYS", "Key", "check_settings", "setting", "settings_file"]
 
+_FILE = "GP_LABELER_SETTINGS"
+"""Variable that names the file, which must exist then."""
+
 _MAX_BYTES = 100_000
 _TRUE, _FALSE = {"1", "true", "yes", "on"}, {"0", "false", "no", "off"}
 
@@ -93,7 +96,8 @@ def setting(name: str) -> Any:
     if written:
         return _checked(key, written, f"the variable {key.variable}")
     file = settings_file()
-    values = _read(file) if file.is_file() else {}
+    is_named = bool(os.environ.get(_FILE))
+    values = _read(file) if is_named or file.is_file() else {}
     return _checked(key, values[name], name, file) if name in values else None
 
 
@@ -117,7 +121,7 @@ def settings_file() -> Path:
     pathlib.Path
         ``GP_LABELER_SETTINGS``, or ``gp-labeler/settings.toml`` in the user's folder for configuration.
     """
-    named = os.environ.get("GP_LABELER_SETTINGS")
+    named = os.environ.get(_FILE)
     return Path(named) if named else _configuration_folder() / "gp-labeler" / "settings.toml"
 
 

@@ -106,6 +106,8 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
                 ("Shift+move", "move the crosshair"),
                 ("Drag an end of a ruler", "move it, on the bone"),
                 ("Arrow keys", "rotate"),
+                ("Shift+arrow keys", "pan"),
+                ("+ and −", "zoom"),  # noqa: RUF001 - as on the keyboard
                 ("Right click on a point", "open the menu of the point"),
                 ("Double click", "maximise or restore"),
             ),
@@ -118,6 +120,8 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
                 ("Ctrl+click", "move the chosen point here"),
                 ("Drag an end of a ruler", "move it"),
                 ("Arrow keys", "move the point a voxel"),
+                ("Shift+arrow keys", "move the crosshair (Ctrl: ten voxels)"),
+                ("+ and −", "zoom"),  # noqa: RUF001 - as on the keyboard
                 ("Wheel, F and B", "next and previous slice"),
                 ("Right drag, Ctrl+wheel", "zoom"),
                 ("Middle drag, Shift+drag", "pan"),

@@ -8,6 +8,7 @@ from gp_core.landmarks.features import FEATURES
 from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
 from gp_labeler.document.edits import CheckPoint, SwapSides
 from gp_labeler.document.state import How, Landmark
+from gp_labeler.document.touches import TouchHow
 from gp_labeler.models.workspace import Workspace
 
 __all__ = ["edit_rows", "file_rows", "help_rows", "landmark_rows", "view_rows"]
@@ -93,11 +94,14 @@ def _can_confirm(workspace: Workspace) -> bool:
 
 def _can_place(workspace: Workspace) -> bool:
     """Whether placing the chosen point moves none that has a place already, or is asked for."""
-    return (
-        _has_scan(workspace)
-        and _is_free(workspace)
-        and (workspace.interaction.replacing or not _is_shown(workspace))
-    )
+    if not _has_scan(workspace):
+        return False
+    if not workspace.interaction.replacing:
+        if workspace.measure.kind is not None:
+            return True
+        if workspace.interaction.tool == "touch":
+            return workspace.pose.target is not None
+    return _is_free(workspace) and (workspace.interaction.replacing or not _is_shown(workspace))
 
 
 # What is done
@@ -148,8 +152,15 @@ def _auto_window_level(workspace: Workspace) -> None:
 
 
 def _place_at_crosshair(workspace: Workspace) -> None:
-    workspace.labels.place(workspace.view.crosshair, How.SLICE)
-    workspace.interaction.arm_replacing(False)
+    """Do at the crosshair what a click there does: place a landmark, an end of a ruler, or a touch."""
+    where = workspace.view.crosshair
+    if workspace.measure.kind is not None and not workspace.interaction.replacing:
+        workspace.measure.click(where)
+    elif workspace.interaction.tool == "touch" and not workspace.interaction.replacing:
+        workspace.pose.record(where, TouchHow.SCAN)
+    else:
+        workspace.labels.place(where, How.SLICE)
+        workspace.interaction.arm_replacing(False)
 
 
 def _confirm(workspace: Workspace) -> None:
@@ -274,6 +285,11 @@ def view_rows() -> Iterator[Action]:
     yield row("view.fit_here", "Show everything in the view under the pointer", ("Ctrl+R",),
               IN_WINDOW, _has_scan, group="layout",
               hint="Does not change the other views")
+    yield row("view.next_view", "Keyboard to the next view", ("F3",), IN_WINDOW, _has_scan, group="layout",
+              hint="The view with the border has the keyboard: arrow keys, Space and Enter work there")
+    for title, step, key in _STEPS:
+        yield row(f"view.step_{step}", title, (key,), IN_WINDOW, _has_scan if step == "label" else _always,
+                  group="step", hint="Shows the panel of this step and moves the keyboard to it")
     yield row("view.reset", "Show everything", ("R",), lambda w: w.view.reset_asked.emit(), _has_scan,
               group="show")
     yield row("view.go_to", "Go to position…", ("Ctrl+G",), IN_WINDOW, _has_scan,
@@ -309,6 +325,10 @@ def view_rows() -> Iterator[Action]:
 _LAYOUTS = (
     ("Four views", "four-up", "V"), ("3D and the best slice", "two-up", "Ctrl+2"), ("3D only", "3d", "D"),
     ("Axial only", "axial", "Z"), ("Sagittal only", "sagittal", "S"), ("Coronal only", "coronal", "C"),
+)
+_STEPS = (
+    ("Step 1: Scan", "scan", "F5"), ("Step 2: Label", "label", "F6"), ("Step 3: Atlas", "atlas", "F7"),
+    ("Step 4: Pose", "pose", "F8"),
 )
 _TEXT_SIZES = (
     ("Larger text", "larger", ("Ctrl+=", "Ctrl++")), ("Smaller text", "smaller", ("Ctrl+-",)),
@@ -348,7 +368,7 @@ def landmark_rows() -> Iterator[Action]:
               lambda w: w.scan.volume is not None, checked=lambda w: w.first_labels.is_running,
               hint="Suggests first labels from labelled scans; choose it again to stop")
     yield row("point.place", "Place at the crosshair", ("Space",), _place_at_crosshair, _can_place,
-              icon="label")
+              icon="label", hint="As a click at the crosshair: a landmark, the end of a ruler, or a touch")
     yield row("point.replace", "Re-place with the next click", ("Shift+P",),
               lambda w: w.interaction.arm_replacing(not w.interaction.replacing),
               lambda w: _has_scan(w) and _is_free(w) and _is_shown(w),

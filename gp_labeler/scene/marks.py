@@ -4,16 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.camera import Viewpoint
 
-__all__ = ["ACTIVE_GROWTH", "FREE_POINT", "LOOKED_AT", "REFERENCE", "GlyphSize", "Mark", "MarkSet"]
+__all__ = [
+    "ACTIVE_GROWTH",
+    "FREE_POINT",
+    "LOOKED_AT",
+    "OTHER",
+    "REFERENCE",
+    "GlyphSize",
+    "Mark",
+    "MarkSet",
+    "growth_of",
+]
 
 REFERENCE = "reference"
 """The state of a mark that is only looked at: smaller, hollow, and never picked."""
+
+OTHER = "other"
+"""The state of a point of the side that is not worked on: smaller, and of another colour."""
 
 FREE_POINT = "free point"
 """The state of one of the three points that a head is straightened by: no landmark, and never picked."""
@@ -24,7 +38,8 @@ LOOKED_AT = frozenset({REFERENCE, FREE_POINT})
 ACTIVE_GROWTH = 1.25
 """How much larger the landmark being worked on is drawn."""
 
-_REFERENCE_GROWTH = 0.8
+_SMALLER = MappingProxyType({REFERENCE: 0.8, OTHER: 0.7})
+"""States that are told from a placed point by their size, and not by their colour alone."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +71,7 @@ class Mark:
     label : str
         What stands beside it; empty for none.
     state : str
-        ``placed``, ``suggested``, ``computed``, ``doubtful``, ``other`` (the other side), one of
+        ``placed``, ``suggested``, ``computed``, ``doubtful``, `OTHER`, one of
         `LOOKED_AT` or any other state of the theme.
     active : bool
         Whether it is the one being worked on: larger, and its label is never left out.
@@ -103,11 +118,10 @@ class MarkSet:
         """Return how large the marks are drawn, (N,) device pixels, `ratio` of which are a logical one."""
         radius = np.full(len(self._marks), 0.5 * self.size.diameter)
         scaled = radius / view.pixel_sizes(self.positions) if self.size.unit == "mm" else radius * ratio
-        grown: FloatArray = scaled * [_growth(mark) for mark in self._marks]
+        grown: FloatArray = scaled * [growth_of(mark) for mark in self._marks]
         return grown
 
 
-def _growth(mark: Mark) -> float:
-    if mark.state == REFERENCE:
-        return _REFERENCE_GROWTH
-    return ACTIVE_GROWTH if mark.active else 1.0
+def growth_of(mark: Mark) -> float:
+    """Return how much larger than others a mark is drawn, in every view."""
+    return _SMALLER.get(mark.state, ACTIVE_GROWTH if mark.active else 1.0)

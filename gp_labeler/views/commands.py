@@ -25,6 +25,7 @@ _ONCE = ("point.accept_ghost", "point.confirm", "point.unseen", "point.clear", "
 
 _FOLDED = {
     "layout": "Views",
+    "step": "Steps",
     "from": "Look from",
     "tool": "Tools",
     "what": "Show",

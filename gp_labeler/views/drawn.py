@@ -16,7 +16,7 @@ from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import SceneColours
 from gp_labeler.scene.ghosts import GhostEllipsoid
-from gp_labeler.scene.marks import FREE_POINT, REFERENCE, Mark
+from gp_labeler.scene.marks import FREE_POINT, OTHER, REFERENCE, Mark
 from gp_labeler.scene.segments import Segment
 
 __all__ = [
@@ -66,7 +66,7 @@ def drawn_marks(workspace: Workspace) -> list[Mark]:
                 continue
             dragged = drag is not None and (drag.side, drag.code) == (side, code)
             position = drag.position if drag is not None and dragged else where
-            state = _MARK_STATES.get(states[code], "placed" if side is active.side else "other")
+            state = _MARK_STATES.get(states[code], "placed" if side is active.side else OTHER)
             is_active = dragged or (side, code) == (active.side, active.code)
             name = code if named or is_active else ""
             marks.append(Mark(key_of(side, code), position, name, state, is_active))

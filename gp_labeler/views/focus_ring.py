@@ -8,14 +8,16 @@ from qtpy.QtWidgets import QWidget
 
 from gp_labeler.views.theme import theme_of
 
-__all__ = ["FocusRing"]
+__all__ = ["BY_KEYBOARD", "FocusRing"]
 
-_WIDTH = 2
-_BY_KEYBOARD = (
+_WIDTH, _EDGE = 2, 1
+"""Of the border, and of the edge inside of it that parts it from a picture; logical pixels."""
+BY_KEYBOARD = (
     Qt.FocusReason.TabFocusReason,
     Qt.FocusReason.BacktabFocusReason,
     Qt.FocusReason.ShortcutFocusReason,
 )
+"""Why a widget gets the focus, where a key did it."""
 
 
 class FocusRing(QWidget):
@@ -39,7 +41,7 @@ class FocusRing(QWidget):
         """Appear, go, and keep the size of the view."""
         if watched is self._view:
             if isinstance(event, QFocusEvent):
-                self.setVisible(event.gotFocus() and event.reason() in _BY_KEYBOARD)
+                self.setVisible(event.gotFocus() and event.reason() in BY_KEYBOARD)
                 self.raise_()
             elif event.type() in (QEvent.Type.Resize, QEvent.Type.Show):
                 self.resize(self._view.size())
@@ -48,6 +50,10 @@ class FocusRing(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         """Draw the border."""
         painter = QPainter(self)
-        painter.setPen(QPen(QColor(theme_of(self).accent_text), 2 * _WIDTH))
-        painter.drawRect(self.rect())
+        theme, square = theme_of(self), Qt.PenJoinStyle.MiterJoin
+        for width, colour in ((_WIDTH + _EDGE, theme.card), (_WIDTH, theme.focus)):  # on black, on bone
+            pen = QPen(QColor(colour), 2 * width)
+            pen.setJoinStyle(square)
+            painter.setPen(pen)
+            painter.drawRect(self.rect())
         painter.end()

@@ -48,7 +48,7 @@ from gp_labeler.views.drawn import (
 from gp_labeler.views.drawn_measurements import kept_measurements, mark_or_handle, moving_measurements
 from gp_labeler.views.focus_ring import FocusRing
 from gp_labeler.views.fonts import TEXT, text_scale
-from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of, zoom_of
 from gp_labeler.views.painting.scene_overlay import (
     SceneOverlay,
     paint_crosshair,
@@ -534,14 +534,21 @@ class SceneView(QWidget):
         event.accept()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
-        arrow = _ARROWS.get(Qt.Key(event.key()))
+        arrow, zoom, held = _ARROWS.get(Qt.Key(event.key())), zoom_of(event), modifiers_of(event)
+        camera = self.scene.camera
         if event.key() == Qt.Key.Key_Escape and self._placement.escape():
             event.accept()
-        elif arrow is not None and event.modifiers() == Qt.KeyboardModifier.NoModifier:
-            self.scene.camera.rotate(*arrow)
-            self.redraw(quick=True)
+            return
+        if arrow is not None and held is Modifier.NONE:
+            camera.rotate(*arrow)
+        elif arrow is not None and held is Modifier.SHIFT:
+            camera.pan((0.0, 0.0), (-arrow[0], -arrow[1]))
+        elif zoom is not None:
+            camera.zoom(zoom)
         else:
             super().keyPressEvent(event)
+            return
+        self.redraw(quick=True)
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802
         self._leave_pointer()

@@ -61,7 +61,7 @@ class ShortcutsSheet(QDialog):
         close.clicked.connect(self.accept)
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 8, 0, 12)
-        whole.addWidget(scrolled(sheet))
+        whole.addWidget(scrolled(sheet, page="Keys and mouse gestures"))
         row = QHBoxLayout()
         row.setContentsMargins(20, 0, 20, 0)
         row.addStretch(1)

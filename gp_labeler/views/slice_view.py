@@ -25,7 +25,7 @@ from gp_labeler.scene.window_level import WindowLevel
 from gp_labeler.views.drawn import drawn_marks, point_of
 from gp_labeler.views.drawn_measurements import handle_of, mark_or_handle
 from gp_labeler.views.focus_ring import FocusRing
-from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of, zoom_of
 from gp_labeler.views.painting.slice_layers import SliceLayer
 from gp_labeler.views.painting.slice_painter import SlicePainter, reach_of
 from gp_labeler.views.placement_tool import PlacementTool, nudge
@@ -52,6 +52,8 @@ _NEAR_PIXELS = 8.0
 """A mark is meant by a click within so many logical pixels."""
 
 _STEPS = {Qt.Key.Key_F: 1, Qt.Key.Key_PageUp: 1, Qt.Key.Key_B: -1, Qt.Key.Key_PageDown: -1}
+_FAR = 10
+"""Voxels that the crosshair moves at once with Ctrl."""
 
 
 class SliceView(QWidget):
@@ -389,14 +391,17 @@ class SliceView(QWidget):
             self.move_to(view.position)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
-        key = Qt.Key(event.key())
-        plain = event.modifiers() in (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.KeypadModifier)
+        key, held, zoom = Qt.Key(event.key()), modifiers_of(event), zoom_of(event)
         if key == Qt.Key.Key_Escape and self._placement.escape():
             event.accept()
-        elif key in _ARROWS and plain and self.source is not None:
+        elif key in _ARROWS and held is Modifier.NONE and self.source is not None:
             self._nudge(*_ARROWS[key])
-        elif key in _STEPS and plain:
+        elif key in _ARROWS and held in (Modifier.SHIFT, Modifier.SHIFT | Modifier.CTRL):
+            self._move_crosshair(*_ARROWS[key], voxels=_FAR if Modifier.CTRL in held else 1)
+        elif key in _STEPS and held is Modifier.NONE:
             self.step(_STEPS[key])
+        elif zoom is not None and self.shown is not None:
+            self._take(self.shown.zoomed(zoom, about=self._crosshair_pixel()))
         else:
             super().keyPressEvent(event)
 
@@ -432,6 +437,20 @@ class SliceView(QWidget):
         assert self.source is not None
         direction = right * self.slice_plane.right + down * self.slice_plane.down
         nudge(self._workspace, self.source.step_along(direction) * direction)
+
+    def _move_crosshair(self, right: float, down: float, *, voxels: int) -> None:
+        """Move the crosshair along the slice, whichever point is chosen."""
+        if self.source is not None:
+            direction = right * self.slice_plane.right + down * self.slice_plane.down
+            there = self._workspace.view.crosshair + voxels * self.source.step_along(direction) * direction
+            if self._is_inside(there):
+                self._workspace.view.set_crosshair(there)
+
+    def _crosshair_pixel(self) -> FloatArray | None:
+        """Return the (2,) pixel of the crosshair; None where it is out of sight."""
+        assert self.shown is not None
+        pixel: FloatArray = self.shown.scan_to_pixel(self._workspace.view.crosshair[None])[0]
+        return pixel if bool(((pixel >= 0) & (pixel < self.shown.size)).all()) else None
 
     def _edge_for(self, mark: str) -> BoneEdge | None:
         """Return the edge of bone, on which a point stays that was placed on bone; None for other points."""

@@ -52,14 +52,14 @@ QToolButton { padding: 4px 6px; }
 QPushButton:hover, QToolButton:hover { background: $hover; }
 QPushButton:pressed, QToolButton:pressed, QToolButton:checked { background: $selected; }
 QToolButton:checked { border-color: $accent_text; }
-QPushButton:focus, QToolButton:focus { border-color: $accent_text; }
-QToolButton:checked:focus { border-color: $text; }
+QPushButton:focus { border: 2px solid $focus; padding: 4px 11px; }
+QToolButton:focus, QToolButton:checked:focus { border: 2px solid $focus; padding: 3px 5px; }
 QPushButton:disabled, QToolButton:disabled { background: transparent; border-color: $border; color: $faint; }
 QPushButton[role="primary"] {
     background: $accent; border-color: $accent; color: $on_accent; font-weight: 600;
 }
 QPushButton[role="primary"]:hover { background: $accent_hover; }
-QPushButton[role="primary"]:focus { border: 2px solid $accent_text; padding: 4px 11px; }
+QPushButton[role="primary"]:focus { border: 2px solid $focus; padding: 4px 11px; }
 QPushButton[role="primary"]:disabled { background: transparent; border-color: $border; color: $faint; }
 QPushButton[role="huge"] { font-size: $px22; padding: 8px 20px; }
 QPushButton[role="huge-primary"] {
@@ -72,27 +72,32 @@ QPushButton[role="link"] {
     text-align: left; padding: 3px 6px;
 }
 QPushButton[role="link"]:hover { background: $hover; }
-QPushButton[role="link"]:focus { border-color: $accent_text; }
+QPushButton[role="link"]:focus { border: 2px solid $focus; padding: 2px 5px; }
 QPushButton[role="link"]:disabled { color: $faint; }
 QToolButton[role="quiet"] { background: transparent; border-color: transparent; }
 QToolButton[role="quiet"]:hover { background: $hover; }
-QToolButton[role="quiet"]:focus { border-color: $accent_text; }
+QToolButton[role="quiet"]:focus { border: 2px solid $focus; }
 QToolButton::menu-indicator { image: none; }
 
 QLineEdit, QPlainTextEdit, QTextEdit, QComboBox {
     background: $field; border: 1px solid $border_strong; border-radius: 5px; padding: 4px 6px;
     selection-background-color: $accent; selection-color: $on_accent;
+    placeholder-text-color: $faint;
 }
-QLineEdit:focus, QPlainTextEdit:focus, QTextEdit:focus, QComboBox:focus { border-color: $accent_text; }
+QLineEdit:focus, QPlainTextEdit:focus, QTextEdit:focus, QComboBox:focus {
+    border: 2px solid $focus; padding: 3px 5px;
+}
 QLineEdit[wrong="true"] { border-color: $danger; }
 QComboBox::drop-down { border: none; width: 22px; }
 QComboBox::down-arrow { image: url("$icons/down.png"); width: $px12; height: $px12; }
 QComboBox QAbstractItemView {
-    background: $card; border: 1px solid $border_strong; selection-background-color: $selected;
-    selection-color: $text; outline: none;
+    background: $card; border: 1px solid $border_strong; selection-background-color: $accent;
+    selection-color: $on_accent; outline: none;
 }
-QCheckBox, QRadioButton { spacing: 6px; background: transparent; padding: 2px; }
-QCheckBox:focus, QRadioButton:focus { color: $accent_text; }
+QCheckBox, QRadioButton {
+    spacing: 6px; background: transparent; border: 2px solid transparent; border-radius: 5px;
+}
+QCheckBox:focus, QRadioButton:focus { border-color: $focus; }
 QCheckBox::indicator {
     width: $px14; height: $px14; background: $field; border: 1px solid $border_strong; border-radius: 4px;
 }
@@ -106,11 +111,11 @@ QRadioButton::indicator:checked {
     width: $dot; height: $dot; background: $on_accent; border: 5px solid $accent; border-radius: $ring;
 }
 
-QTableView:focus, QListView:focus, QTreeView:focus { border-color: $accent_text; }
 QTableView, QListView, QTreeView {
     background: $card; border: 1px solid $border; border-radius: 8px; outline: none; gridline-color: $border;
-    selection-background-color: $selected; selection-color: $text;
+    selection-background-color: $accent; selection-color: $on_accent;
 }
+QTableView:focus, QListView:focus, QTreeView:focus { border-color: $focus; }
 QHeaderView { background: transparent; }
 QHeaderView::section {
     background: transparent; color: $muted; border: none; border-bottom: 1px solid $border; padding: 4px 6px;
@@ -118,15 +123,16 @@ QHeaderView::section {
 QTableCornerButton::section { background: $card; border: none; border-bottom: 1px solid $border; }
 QListView::item { padding: 5px 8px; border-radius: 4px; }
 QListView::item:hover { background: $hover; }
-QListView::item:selected { background: $selected; color: $text; }
+QListView::item:selected { background: $accent; color: $on_accent; }
 
 QMenuBar { background: $window; color: $text; }
 QMenuBar::item { padding: 4px 10px; background: transparent; border-radius: 4px; }
-QMenuBar::item:selected { background: $hover; }
+QMenuBar::item:selected { background: $accent; color: $on_accent; }
 QMenu { background: $card; border: 1px solid $border_strong; padding: 4px; menu-scrollable: 1; }
 QMenu::item { padding: 5px 24px 5px 12px; border-radius: 4px; }
-QMenu::item:selected { background: $selected; }
-QMenu::item:disabled { color: $faint; }
+QMenu::item:selected { background: $accent; color: $on_accent; }
+QMenu::item:disabled { background: transparent; color: $faint; }
+QMenu::item:disabled:selected { border: 1px solid $border_strong; }
 QMenu::separator { height: 1px; background: $border; margin: 4px 8px; }
 QToolBar { background: $window; border: none; spacing: 4px; padding: 4px 8px; }
 QStatusBar { background: $window; border-top: 1px solid $border; color: $text; }
@@ -134,6 +140,8 @@ QStatusBar::item { border: none; }
 QDockWidget::title { background: $panel; padding: 6px; }
 
 QScrollArea { background: transparent; border: none; }
+QScrollArea[role="page"] { border: 2px solid transparent; }
+QScrollArea[role="page"]:focus { border-color: $focus; }
 QScrollArea > QWidget > QWidget[role="panel"] { background: $panel; }
 QScrollBar:vertical { background: transparent; width: 10px; margin: 2px; }
 QScrollBar:horizontal { background: transparent; height: 10px; margin: 2px; }
@@ -155,7 +163,9 @@ QSlider::sub-page:horizontal { background: $accent_hover; border-radius: 2px; }
 QSlider::handle:horizontal {
     border: none; background: $text; width: 14px; height: 14px; margin: -5px 0; border-radius: 7px;
 }
-QSlider::handle:horizontal:focus { background: $accent_text; }
+QSlider::handle:horizontal:focus {
+    background: $card; border: 3px solid $focus; width: 8px; height: 8px;
+}
 QSlider::sub-page:horizontal:disabled { background: $border_strong; }
 QSlider::handle:horizontal:disabled { background: $faint; }
 QTabBar::tab {

@@ -58,6 +58,8 @@ class Theme:
         The one next action, what is written on it, and links.
     selected : str
         Background of the row being worked on.
+    focus : str
+        Around what the keys go to: stands out from every background, and from the accent.
     warning, danger, good : str
         What to look at, what stands against it, what is done.
     states : mapping
@@ -85,6 +87,7 @@ class Theme:
     on_accent: str
     accent_text: str
     selected: str
+    focus: str
     warning: str
     danger: str
     good: str
@@ -144,6 +147,7 @@ DARK = Theme(
     on_accent="#FFFFFF",
     accent_text="#7CC4FA",
     selected="#22364B",
+    focus="#B9E1FF",
     warning="#F6B44C",
     danger="#FF8086",
     good="#6FE3B4",
@@ -181,6 +185,7 @@ LIGHT = Theme(
     on_accent="#FFFFFF",
     accent_text="#125FA8",
     selected="#D9E8F7",
+    focus="#0B1620",
     warning="#8A5200",
     danger="#B3202B",
     good="#08704A",

@@ -19,11 +19,25 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for key in KEYS:
         monkeypatch.delenv(key.variable, raising=False)
     monkeypatch.setenv("GP_LABELER_SETTINGS", str(tmp_path / "settings.toml"))
+    (tmp_path / "settings.toml").write_text("")
     return tmp_path / "settings.toml"
 
 
-def test_without_a_file_nothing_is_set(file: Path) -> None:
+def test_without_a_word_in_the_file_nothing_is_set(file: Path) -> None:
     assert [setting(key.name) for key in KEYS] == [None] * len(KEYS)
+
+
+def test_without_a_file_nothing_is_set(file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("GP_LABELER_SETTINGS")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "nothing"))
+    monkeypatch.setattr("sys.platform", "linux")
+    assert [setting(key.name) for key in KEYS] == [None] * len(KEYS)
+
+
+def test_a_file_that_is_named_must_be_there(file: Path) -> None:
+    file.unlink()
+    with pytest.raises(GpError, match=r"settings\.toml: the settings cannot be read \(.*No such file"):
+        setting("theme")
 
 
 def test_the_file_says_and_the_variable_overrules(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,11 +12,11 @@ from qtpy.QtGui import QColor, QPainter, QPen
 from gp_core.validation import FloatArray
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.colours import SceneColours
-from gp_labeler.scene.marks import ACTIVE_GROWTH, LOOKED_AT, REFERENCE, Mark, MarkSet
+from gp_labeler.scene.marks import LOOKED_AT, REFERENCE, Mark, MarkSet
 from gp_labeler.views.painting.marker_pictures import marker_picture
 from gp_labeler.views.painting.name_tags import NameTag
 
-__all__ = ["ACTIVE_GROWTH", "PlacedMark", "paint_mark", "place_marks", "tags_of"]
+__all__ = ["PlacedMark", "paint_mark", "place_marks", "shape_of", "tags_of"]
 
 _SHAPES = {"computed": "rhomb", "doubtful": "triangle", "suggested": "square", REFERENCE: "inverted"}
 """A state shows by shape as well as by colour; others are balls."""
@@ -76,7 +76,7 @@ def paint_mark(
     """
     painter.setOpacity(opacity)
     marker_picture(
-        _SHAPES.get(mark.state, "ball"),
+        shape_of(mark.state),
         round(2 * radius) / 2,
         colours.states.get(mark.state, colours.text),
         full=full and mark.state not in _HOLLOW,
@@ -90,6 +90,11 @@ def paint_mark(
         painter.setPen(QPen(QColor(colours.states["active"]), _RING_LINE * ratio))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawEllipse(QPointF(*pixel), radius + _RING * ratio, radius + _RING * ratio)
+
+
+def shape_of(state: str) -> str:
+    """Return the shape of a mark in some state, one of those of `marker_picture`."""
+    return _SHAPES.get(state, "ball")
 
 
 def place_marks(

@@ -18,7 +18,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.crosshair_arms import HANDLE_PIXELS
 from gp_labeler.scene.ghosts import GhostEllipsoid, ellipse
-from gp_labeler.scene.marks import Mark
+from gp_labeler.scene.marks import Mark, growth_of
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.segments import Segment
 from gp_labeler.scene.slice_viewport import SliceViewport
@@ -26,7 +26,7 @@ from gp_labeler.scene.slices import SliceImage, VolumeSlicer
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 from gp_labeler.views.filter_words import filter_words
 from gp_labeler.views.fonts import TEXT, text_scale
-from gp_labeler.views.painting.marks import ACTIVE_GROWTH, paint_mark
+from gp_labeler.views.painting.marks import paint_mark
 from gp_labeler.views.painting.name_tags import NameTag, paint_words, place_names
 from gp_labeler.views.painting.qt_paths import polygon, segments_path
 from gp_labeler.views.painting.scale_bar import paint_scale_bar
@@ -384,7 +384,7 @@ def _on_black(state: str) -> str:
 def _radius(mark: Mark, glyph_mm: float | None, shown: SliceViewport, ratio: float) -> float:
     """Return how large a point is drawn, device pixels."""
     radius = 4.0 * ratio if glyph_mm is None else 0.5 * glyph_mm / shown.mm_per_pixel
-    return radius * (ACTIVE_GROWTH if mark.active else 1.0)
+    return radius * growth_of(mark)
 
 
 def _name(mark: Mark, pixel: FloatArray) -> NameTag:

@@ -136,7 +136,7 @@ def link(text: str, hint: str = "") -> QPushButton:
     """Return a button that looks like a link."""
     button = QPushButton(text)
     button.setProperty("role", "link")
-    button.setStyleSheet("padding: 3px 2px")
+    button.setStyleSheet("QPushButton { padding: 3px 2px } QPushButton:focus { padding: 2px 1px }")
     button.setToolTip(hint)
     button.setCursor(Qt.CursorShape.PointingHandCursor)
     return button

@@ -169,9 +169,22 @@ _LONGEST_FACT = "Which scan"
 """The longest name of a fact: values of all lists begin at the same place."""
 
 
-def scrolled(content: QWidget) -> Scrolled:
-    """Return a scroll area that asks for the width its content needs."""
-    return Scrolled(content)
+def scrolled(content: QWidget, *, page: str = "") -> Scrolled:
+    """Return a scroll area that asks for the width its content needs.
+
+    Parameters
+    ----------
+    content : QWidget
+        What it holds.
+    page : str
+        For a page that is only read: what it is. It takes the focus then, so that keys can scroll it.
+    """
+    area = Scrolled(content)
+    if page:
+        area.setProperty("role", "page")
+        area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        area.setAccessibleName(page)
+    return area
 
 
 class Card(QWidget):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from qtpy.QtCore import QEvent, QRectF, QSize, Qt, Signal
-from qtpy.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent
+from qtpy.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
 from qtpy.QtWidgets import QAbstractButton, QButtonGroup, QSizePolicy, QVBoxLayout, QWidget
 
 from gp_core.landmarks.features import Side
@@ -42,6 +42,8 @@ STEPS = (
     WorkStep("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
 )
 _PAD = 8
+_DISABLED = 0.5
+"""Opacity of the icon of a step that cannot be chosen yet; its name stays as legible as all words."""
 _LONGEST = 88
 """Room for the name of an added panel, logical pixels at the normal text size; longer ones are shortened."""
 
@@ -198,16 +200,16 @@ class _RailButton(QAbstractButton):
         if self.isChecked():
             painter.fillRect(QRectF(0, 10, 3, self.height() - 20), QColor(theme.accent_text))
         if self.hasFocus():
-            painter.setPen(QColor(theme.accent_text))
+            painter.setPen(QPen(QColor(theme.focus), 2))
             painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawRoundedRect(box, 8, 8)
+            painter.drawRoundedRect(box.adjusted(0.5, 0.5, -0.5, -0.5), 8, 8)
         colour = theme.text if self.isChecked() else theme.muted if self.isEnabled() else theme.faint
-        if not self.isEnabled():
-            painter.setOpacity(0.75)
         has_icon = self.height() >= self.sizeHint().height()
         if has_icon:
             side = pixels(self, 22)
+            painter.setOpacity(1.0 if self.isEnabled() else _DISABLED)
             draw_icon(painter, self._icon, QRectF((self.width() - side) / 2, 10, side, side), QColor(colour))
+            painter.setOpacity(1.0)
         if self._done:
             side = pixels(self, 13)
             left = self.width() / 2 + pixels(self, 9) if has_icon else box.right() - side

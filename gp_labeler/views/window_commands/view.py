@@ -7,6 +7,8 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from qtpy.QtCore import Qt
+
 from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
 from gp_labeler.models.typed_position import typed_position
@@ -56,6 +58,20 @@ def ask_position(workspace: Workspace, prompts: Prompts) -> None:
         problem = f"{where_text(position)} lies outside the scan"
         raise GpError(problem, remedy=f"It reaches from {low} to {high}.")
     view.show_point(position)
+
+
+def go_to_next_view(window: MainWindow) -> None:
+    """Give the keyboard to the next view that is shown; from elsewhere, to the first."""
+    views = [window.grid.frames[name].view for name in window.grid.shown]
+    here = next((n for n, view in enumerate(views) if view.hasFocus()), -1)
+    views[(here + 1) % len(views)].setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+
+def go_to_step(window: MainWindow, step: str) -> None:
+    """Show a step, and give the keyboard to its panel."""
+    window.set_step(step)
+    panel = window.steps[step] if window.steps[step].isVisible() else window.welcome
+    panel.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
 
 def look_from(window: MainWindow, letter: str) -> None:
@@ -122,6 +138,11 @@ def ask_reopen_mirrored(workspace: Workspace, prompts: Prompts) -> None:
 VIEW_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
     {
         "view.fit_here": reset_view_here,
+        "view.next_view": go_to_next_view,
+        "view.step_scan": partial(go_to_step, step="scan"),
+        "view.step_label": partial(go_to_step, step="label"),
+        "view.step_atlas": partial(go_to_step, step="atlas"),
+        "view.step_pose": partial(go_to_step, step="pose"),
         "view.zoom_to_point": zoom_to_point,
         "view.go_to": Asking(ask_position),
         "view.from_anterior": partial(look_from, letter="A"),

@@ -101,6 +101,8 @@ NOT_WRITTEN = {
     "help.about": "a dialog that changes nothing",
     "help.record": "the recorder itself",
     "view.canvas": "a setting of this computer, in force at the next start",
+    "view.next_view": "moves the keyboard only",
+    **dict.fromkeys([f"view.step_{step}" for step in ("scan", "label", "atlas", "pose")], "shows a panel"),
     **dict.fromkeys(("point.skip", "point.next", "point.previous", "point.other_side"), CHOOSES),
     **dict.fromkeys(("pose.skip", "pose.other_side"), CHOOSES),
     **dict.fromkeys(("pose.tracker", "pose.guide"), "shows settings, or asks for touches, which are written"),

@@ -18,9 +18,9 @@ from panel_cases import (
 from qtpy.compat import isalive
 from qtpy.QtCore import QCoreApplication, QEvent, QModelIndex, QPoint, QSize, Qt
 from qtpy.QtGui import QFontMetrics, QGuiApplication
-from qtpy.QtWidgets import QApplication, QMenu
+from qtpy.QtWidgets import QApplication, QLabel, QMenu
 
-from gp_core.landmarks.features import CODES, FEATURES, Side, index_of
+from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
 from gp_labeler.document.edits import CheckPoint, SwapPoints
 from gp_labeler.models.workflow import Active
 from gp_labeler.models.workspace import Workspace
@@ -264,6 +264,21 @@ def test_skip_unseen_and_side_buttons(workspace, panel, qtbot):
     code = workspace.labels.active.code
     qtbot.mouseClick(panel.card.sides[RIGHT], CLICK)
     assert workspace.labels.active == Active(RIGHT, code)
+
+
+def test_the_card_tells_common_mistakes_once_asked_and_for_all_that_follow(workspace, panel, qtbot):
+    def told() -> str:
+        texts = [label.text() for label in panel.card.findChildren(QLabel) if label.isVisible()]
+        return next((row.mistakes for row in FEATURES if row.mistakes in texts), "")
+
+    workspace.labels.set_active(Active(LEFT, "CA"))
+    assert told() == ""
+    qtbot.keyClick(panel.card.mistakes, Qt.Key.Key_Space)
+    assert told() == feature("CA").mistakes
+    workspace.labels.set_active(Active(RIGHT, "OS"))
+    assert told() == feature("OS").mistakes
+    qtbot.mouseClick(panel.card.mistakes, CLICK)
+    assert told() == ""
 
 
 def test_an_error_is_told_and_nothing_else_happens(workspace, panel, qtbot):

@@ -24,10 +24,13 @@ from gp_labeler.models.workflow import Active
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.panels.label.export_dialog import ExportDialog
+from gp_labeler.views.panels.label.labellings_dialog import LabellingsDialog
 from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.measure.dialog import MeasureDialog
 from gp_labeler.views.panels.pose.physical_dialog import PhysicalDialog
 from gp_labeler.views.panels.scan.import_dialog import ImportDialog
 from gp_labeler.views.panels.scan.recover_dialog import RecoverDialog
+from gp_labeler.views.panels.scan.specimen_list_dialog import SpecimenListDialog
 from gp_labeler.views.panels.tracker.dialog import TrackerDialog
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
@@ -284,6 +287,9 @@ def _dialog_makers(window: MainWindow, folder: Path) -> dict[str, Callable[[], Q
         "keys": lambda: ShortcutsSheet(window),
         "guide": lambda: GuideWindow(workspace, window),
         "physical test": lambda: PhysicalDialog(workspace, saving, window),
+        "measurements": lambda: MeasureDialog(workspace, window.commands.actions, window),
+        "labellings": lambda: LabellingsDialog(workspace, window),
+        "specimens": lambda: SpecimenListDialog(workspace, window.prompts, window),
     }
 
 

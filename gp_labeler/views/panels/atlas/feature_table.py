@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QRectF, QSize, Qt
-from qtpy.QtGui import QColor, QPainter
+from qtpy.QtGui import QColor, QPainter, QPen
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QStyle,
@@ -179,6 +179,7 @@ class FeatureTable(QTableView):
             policy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._arrange()
         self.clicked.connect(self._go_to)
+        self.activated.connect(self._go_to)
         follow(self, workspace.atlas.changed, self._on_atlas)
         for signal in (
             workspace.labels.checked,
@@ -241,6 +242,9 @@ class _Cells(QStyledItemDelegate):
         painter.save()
         if option.state & QStyle.StateFlag.State_MouseOver:
             painter.fillRect(box, QColor(theme.hover))
+        if view.hasFocus() and view.currentIndex() == index:
+            painter.setPen(QPen(QColor(theme.focus), 2))
+            painter.drawRect(box.adjusted(1, 1, -1, -1))
         font = font_of(view)
         words, middle = str(index.data()), Qt.AlignmentFlag.AlignVCenter
         if index.column() == 0:

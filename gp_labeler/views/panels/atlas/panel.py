@@ -76,6 +76,7 @@ class AtlasPanel(QWidget):
         self._area = scrolled(content)
         self._area.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
         layout.addWidget(self._area)
+        self.setFocusProxy(self.which.open)
         self._is_alone, self._is_wide = False, True
         fit(self, self._share_columns)
 

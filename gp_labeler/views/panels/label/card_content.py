@@ -32,8 +32,8 @@ class CardContent:
     ----------
     eyebrow, code, name, aside, aside_hint : str
         Such as ``Place next · left · 3 of 20``, ``IN``, ``Incisors``, ``both sides``, and what that means.
-    definition, where : str
-        What the feature is, and how to find it.
+    definition, where, mistakes : str
+        What the feature is, how to find it, and what often goes wrong.
     status, status_role : str
         How far it is, and the look of that line: ``ghost``, ``good``, ``danger`` or ``hint``.
     state : str
@@ -56,6 +56,7 @@ class CardContent:
     aside_hint: str = ""
     definition: str = ""
     where: str = ""
+    mistakes: str = ""
     status: str = ""
     status_role: str = "hint"
     state: str = "to do"
@@ -112,6 +113,7 @@ def content_of(
         aside_hint=hint,
         definition=row.definition,
         where=f"{row.where} Best seen in {_VIEWS[row.view]}{of_head}.",
+        mistakes=row.mistakes,
         plane=plane,
         plane_text=_PLANES.get(plane, ""),
         status=f"{_status_words(labels, side, row.code)} Locked against change." if mark.locked else status,

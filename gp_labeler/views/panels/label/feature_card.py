@@ -26,6 +26,7 @@ from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.action_button import Actions, action_button
+from gp_labeler.views.panels.card_parts import link
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.label.annotation_row import AnnotationRow
 from gp_labeler.views.panels.label.card_content import CardContent, content_of
@@ -37,6 +38,7 @@ from gp_labeler.views.theme import theme_of
 __all__ = ["FeatureCard"]
 
 _CHIP = 14
+_DOWN, _UP = "\N{BLACK DOWN-POINTING TRIANGLE}", "\N{BLACK UP-POINTING TRIANGLE}"
 _TALL = 350
 """From this height on the picture stands above the words, not beside; at the normal text size."""
 
@@ -88,6 +90,7 @@ class FeatureCard(QWidget):
         )
         self._eyebrow.setText(now.eyebrow)
         self._title.setText(f"{now.code}  {now.name}" if now.code else now.name)
+        self._show_mistakes()
         for label, text in ((self._aside, now.aside), (self._where, now.where), (self._status, now.status)):
             label.setText(text)
             label.setVisible(bool(text))
@@ -106,6 +109,10 @@ class FeatureCard(QWidget):
         self._eyebrow, self._title = _label("eyebrow"), _label("title")
         self._aside, self._definition = _label("shared"), _label("", wrap=True)
         self._where, self._status = _label("hint", wrap=True), _label("hint", wrap=True)
+        self._mistakes = _label("hint", wrap=True)
+        self.mistakes = link("", "What often goes wrong when this feature is placed")
+        self.mistakes.setCheckable(True)
+        self.mistakes.toggled.connect(self._show_mistakes)
         self._chip = QLabel()
         self.annotation = AnnotationRow(self._workspace)
         self.picture = FeaturePicture()
@@ -156,7 +163,7 @@ class FeatureCard(QWidget):
         status.addWidget(self._status, 1)
         words = QVBoxLayout()
         words.setSpacing(4)
-        for label in (self._definition, self._where):
+        for label in (self._definition, self._where, self._mistakes):
             words.addWidget(label)
         words.addWidget(self.plane, 0, Qt.AlignmentFlag.AlignLeft)
         words.addStretch(1)
@@ -173,8 +180,8 @@ class FeatureCard(QWidget):
         layout.setContentsMargins(12, 8, 12, 12)
         layout.setSpacing(5)
         heading = FlowLayout()
-        heading.addWidget(self._title)
-        heading.addWidget(self._aside)
+        for widget in (self._title, self._aside, self.mistakes):
+            heading.addWidget(widget)
         layout.addLayout(top)
         layout.addLayout(heading)
         layout.addLayout(self._body, 1)
@@ -220,6 +227,15 @@ class FeatureCard(QWidget):
             button.setVisible(bool(now.code))
             with blocked(button):
                 button.setChecked(side is active.side)
+
+    def _show_mistakes(self, *_: object) -> None:
+        """Show what often goes wrong with the feature, if asked for it; also of those that follow."""
+        words, is_open = self._content.mistakes, self.mistakes.isChecked()
+        self.mistakes.setText(f"Mistakes {_UP if is_open else _DOWN}")
+        self.mistakes.setAccessibleName(f"{'Hide' if is_open else 'Show'} common mistakes")
+        self.mistakes.setVisible(bool(words))
+        self._mistakes.setText(words)
+        self._mistakes.setVisible(bool(words) and is_open)
 
     def _show_chip(self) -> None:
         state = self._content.state

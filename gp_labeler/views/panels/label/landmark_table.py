@@ -251,8 +251,8 @@ class _ChipDelegate(QStyledItemDelegate):
         elif is_over:
             painter.fillRect(box, QColor(theme.hover))
         if view.hasFocus() and view.currentIndex() == index:
-            painter.setPen(QPen(QColor(theme.accent_text), 1))
-            painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
+            painter.setPen(QPen(QColor(theme.focus), 2))
+            painter.drawRect(box.adjusted(1, 1, -1, -1))
 
     def _name(
         self,

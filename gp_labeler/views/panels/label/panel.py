@@ -59,3 +59,4 @@ class LabelPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(Scrolled(content))
+        self.setFocusProxy(self.table.view)

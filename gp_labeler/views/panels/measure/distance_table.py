@@ -171,6 +171,9 @@ class _Cells(QStyledItemDelegate):
         if view.is_shown(pair):
             painter.setPen(QPen(QColor(theme.accent), 2))
             painter.drawRect(box.adjusted(1, 1, -1, -1))
+        if view.hasFocus() and view.currentIndex() == index:
+            painter.setPen(QPen(QColor(theme.focus), 2))
+            painter.drawRect(box.adjusted(3, 3, -3, -3))
         self._write(painter, view, box.adjusted(_PAD, 3, -_PAD, -3), pair, str(index.data()))
         painter.restore()
 

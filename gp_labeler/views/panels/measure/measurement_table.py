@@ -43,6 +43,7 @@ class MeasurementTable(QTableWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         self.cellClicked.connect(self._go_to)
+        self.cellActivated.connect(self._go_to)
         self.itemChanged.connect(self._rename)
         for signal in (workspace.measure.changed, workspace.document.reset):
             follow(self, signal, self.refresh)

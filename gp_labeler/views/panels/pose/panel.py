@@ -130,6 +130,7 @@ class PosePanel(QWidget):
         self._area = scrolled(content)
         body.installEventFilter(self)
         layout.addWidget(self._area)
+        self.setFocusProxy(self.touches.table)
 
     def _connect(self) -> None:
         self._leave_timer = QTimer(self, interval=0, singleShot=True)

@@ -15,6 +15,7 @@ from qtpy.QtCore import (
 )
 from qtpy.QtGui import (
     QColor,
+    QFocusEvent,
     QKeyEvent,
     QKeySequence,
     QMouseEvent,
@@ -32,6 +33,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from gp_labeler.views.focus_ring import BY_KEYBOARD
 from gp_labeler.views.fonts import field_width, fit, font_of, line_height, pixels
 from gp_labeler.views.panels.parts import fix_headers
 from gp_labeler.views.panels.pose.touch_cells import column_widths, names_width, paint_cell, paint_ground
@@ -174,6 +176,13 @@ class TouchTable(QTableView):
         if index.isValid() and index.column() not in (USE, CLEAR):
             self.edit_position(self.name_at(index))
 
+    def event(self, event: QEvent) -> bool:  # noqa: D102
+        is_asked = event.type() is QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
+        if is_asked and _begins_number(event) and self.currentIndex().isValid():
+            event.accept()  # else the first digit of a position would be a command of the window
+            return True
+        return super().event(event)
+
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802 - Qt's name
         name = self.name_at(self.currentIndex())
         if event.matches(QKeySequence.StandardKey.Paste):
@@ -188,13 +197,20 @@ class TouchTable(QTableView):
             self.edit_position(name)
         elif event.key() == Qt.Key.Key_Menu:
             self._on_menu(self.visualRect(self.currentIndex()).center())
-        elif event.text() and event.text() in _BEGINS_NUMBER:
+        elif _begins_number(event):
             self.setCurrentIndex(self._model.index(self.currentIndex().row(), XYZ))
             super().keyPressEvent(event)
         elif event.text() and event.text().isprintable():
             event.ignore()  # letters are the window's shortcuts
         else:
             super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Begin at the feature to touch next, where the keyboard came here and no cell is the current one."""
+        super().focusInEvent(event)
+        if event.reason() in BY_KEYBOARD and not self.currentIndex().isValid() and self._model.rows:
+            row = next((n for n, each in enumerate(self._model.rows) if each.target), 0)
+            self.setCurrentIndex(self._model.index(row, XYZ))
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
         super().leaveEvent(event)
@@ -217,8 +233,8 @@ class _TouchDelegate(QStyledItemDelegate):
         painter.save()
         paint_ground(painter, box, row, theme, current=is_current, over=is_over)
         if table.hasFocus() and table.currentIndex() == index:
-            painter.setPen(QPen(QColor(theme.accent_text), 1))
-            painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
+            painter.setPen(QPen(QColor(theme.focus), 2))
+            painter.drawRect(box.adjusted(1, 1, -1, -1))
         painter.setClipRect(box)
         painter.setFont(font_of(table))
         paint_cell(
@@ -266,6 +282,12 @@ class _TouchDelegate(QStyledItemDelegate):
             editor.setProperty("wrong", "true")
             editor.style().unpolish(editor)
             editor.style().polish(editor)
+
+
+def _begins_number(event: QKeyEvent) -> bool:
+    """Whether a key begins a position; with Ctrl or Alt it is a command."""
+    held = event.modifiers() & ~(Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier)
+    return not held and bool(event.text()) and event.text() in _BEGINS_NUMBER
 
 
 def _pointer(table: QTableView) -> QPoint:

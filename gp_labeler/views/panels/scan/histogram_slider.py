@@ -133,7 +133,7 @@ class HistogramSlider(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setFont(font_of(self))
         frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.setPen(QColor(theme.accent_text if self.hasFocus() else theme.border_strong))
+        painter.setPen(QPen(QColor(theme.focus), 3) if self.hasFocus() else QColor(theme.border_strong))
         painter.setBrush(QColor(theme.field))
         painter.drawRoundedRect(frame, 5, 5)
         if self._histogram is None:

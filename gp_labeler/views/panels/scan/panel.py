@@ -66,6 +66,7 @@ class ScanPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(scrolled(content))
+        self.setFocusProxy(self.bone.slider)
         follow(self, workspace.scan.opened, self._refresh)
         follow(self, workspace.document.reset, self._refresh)
         self._refresh()

@@ -65,6 +65,7 @@ class Welcome(QWidget):
         self.setAcceptDrops(True)
         self._drop = _text("Drop a scan, a folder, a specimen or an atlas anywhere on this page", "hint")
         self._lay_out()
+        self.setFocusProxy(self.open_scan)
         self.refresh()
 
     def refresh(self) -> None:
