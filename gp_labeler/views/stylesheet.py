@@ -157,14 +157,12 @@ QProgressBar {
     background: $field; border: 1px solid $border; border-radius: 4px; text-align: center; height: 8px;
 }
 QProgressBar::chunk { background: $accent_hover; border-radius: 3px; }
-QSlider { background: transparent; border: none; min-height: 20px; }
+QSlider { background: transparent; border: 2px solid transparent; border-radius: 5px; min-height: 20px; }
+QSlider:focus { border-color: $focus; }
 QSlider::groove:horizontal { background: $border_strong; border: none; height: 4px; border-radius: 2px; }
 QSlider::sub-page:horizontal { background: $accent_hover; border-radius: 2px; }
 QSlider::handle:horizontal {
     border: none; background: $text; width: 14px; height: 14px; margin: -5px 0; border-radius: 7px;
-}
-QSlider::handle:horizontal:focus {
-    background: $card; border: 3px solid $focus; width: 8px; height: 8px;
 }
 QSlider::sub-page:horizontal:disabled { background: $border_strong; }
 QSlider::handle:horizontal:disabled { background: $faint; }

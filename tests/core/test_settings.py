@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -95,3 +96,10 @@ def test_every_setting_is_documented() -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "settings.md").read_text(encoding="utf-8")
     for key in KEYS:
         assert f"| `{key.name}` | `{key.variable}` |" in page
+
+
+def test_every_setting_is_read_somewhere() -> None:
+    root = Path(__file__).resolve().parents[2]
+    files = [path for package in ("gp_core", "gp_labeler") for path in (root / package).rglob("*.py")]
+    read = {name for path in files for name in re.findall(r'\bsetting\("(\w+)"\)', path.read_text("utf-8"))}
+    assert read == {key.name for key in KEYS}

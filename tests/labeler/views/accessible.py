@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
-import pytest
+import qtpy
 from qtpy.QtCore import QPoint, QRect, QRectF, Qt
-from qtpy.QtGui import QFontMetricsF, QImage, QPainter, QRegion
+from qtpy.QtGui import QFontInfo, QFontMetricsF, QImage, QPainter, QRegion
 from qtpy.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
@@ -34,8 +36,10 @@ from qtpy.QtWidgets import (
 from window_cases import image_bytes
 
 from gp_labeler.scene.colours import contrast
+from gp_labeler.views.main_window import MainWindow
+from gp_labeler.views.theme import THEMES
 
-__all__ = ["Words", "controls", "focus_contrast", "menu_words", "painted_words", "spoken", "words_of"]
+__all__ = ["WORD_CONTRAST", "Walk", "contrast_of", "menu_words", "painted_words", "words_of"]
 
 _CONTROLS = (
     QAbstractButton,
@@ -47,6 +51,12 @@ _CONTROLS = (
     QPlainTextEdit,
     QTextEdit,
 )
+FOCUS_CONTRAST, WORD_CONTRAST = 3.0, 4.5
+"""Web Content Accessibility Guidelines 2.2, criteria 2.4.13 and 1.4.3, level AA for words of any size."""
+
+LARGE = 150
+"""A text size, percent, that a dialog has to follow."""
+
 _SCALE = 3
 """How much larger words are drawn to see their colour: at their own size most pixels are half covered."""
 
@@ -68,7 +78,7 @@ def controls(root: QWidget) -> list[QWidget]:
 
 def spoken(widget: QWidget) -> str:
     """Return the name that a screen reader says."""
-    QAccessible = pytest.importorskip("PySide6.QtGui").QAccessible  # PyQt6 does not give what answers it
+    QAccessible = import_module("PySide6.QtGui").QAccessible
     interface = QAccessible.queryAccessibleInterface(widget)
     return interface.text(QAccessible.Text.Name).strip() if interface else ""
 
@@ -87,7 +97,7 @@ def _pixels(root: QWidget, box: QRect, scale: int = 1) -> np.ndarray:
     return image_bytes(image).view(np.uint32).reshape(image.height(), -1)[:, : image.width()] & 0xFFFFFF
 
 
-def _in_sight(widget: QWidget, root: QWidget, box: QRect | None = None) -> QRect:
+def _seen_part(widget: QWidget, root: QWidget, box: QRect | None = None) -> QRect:
     """Scroll to a widget; return the part of it that is seen, in the root's coordinates."""
     parent = widget.parentWidget()
     while parent is not None and parent is not root:
@@ -109,7 +119,7 @@ def focus_contrast(widget: QWidget, root: QWidget) -> float:
 
     As many pixels as half its outline has change at least that much: those of a caret are too few.
     """
-    box = _in_sight(widget, root)
+    box = _seen_part(widget, root)
     root.setFocus()
     QApplication.processEvents()
     before = _luminance(_pixels(root, box))
@@ -134,7 +144,7 @@ class Words(NamedTuple):
 
     def contrast(self, root: QWidget) -> float:
         """Return the contrast of their colour with what they stand on; 21 where none is seen."""
-        box = _in_sight(self.widget, root, self.box)
+        box = _seen_part(self.widget, root, self.box)
         return _contrast(_pixels(root, box, _SCALE)) if box.width() > 3 and box.height() > 3 else 21.0
 
 
@@ -150,7 +160,7 @@ def _contrast(pixels: np.ndarray) -> float:
 def words_of(root: QWidget) -> Iterator[Words]:
     """Yield the words of widgets that Qt draws."""
     for widget in root.findChildren(QWidget):
-        if widget.isVisible() and (words := _text(widget)):
+        if widget.isVisible() and any(map(str.isalnum, words := _text(widget))):
             yield Words(_kind(widget), words, widget, _room(widget))
 
 
@@ -158,7 +168,7 @@ def _text(widget: QWidget) -> str:
     if isinstance(widget, QLabel):
         return widget.text() if widget.pixmap().isNull() else ""
     if isinstance(widget, QAbstractButton):
-        return widget.text() if type(widget).__module__.startswith("PySide6") else ""
+        return widget.text() if type(widget).__module__.startswith(("PySide6", "PyQt6")) else ""
     if isinstance(widget, QLineEdit):
         return widget.text() or widget.placeholderText()
     if isinstance(widget, QPlainTextEdit):
@@ -187,7 +197,7 @@ def _room(widget: QWidget) -> QRect | None:
         return inner.adjusted(0, 0, -22, 0)
     if isinstance(widget, QAbstractButton) and not widget.icon().isNull():
         return inner.adjusted(widget.iconSize().width() + 8, 0, 0, 0)
-    return inner if isinstance(widget, QAbstractButton | QLineEdit) else None
+    return inner if isinstance(widget, QAbstractButton | QLineEdit | QPlainTextEdit) else None
 
 
 @contextmanager
@@ -198,7 +208,7 @@ def _drawing() -> Iterator[list[Words]]:
 
     def drawn(painter: QPainter, *args: object, **options: object) -> object:
         device = painter.device()
-        if isinstance(device, QWidget) and str(args[-1]).strip():
+        if isinstance(device, QWidget) and any(map(str.isalnum, str(args[-1]))):
             kind = (type(device.parent() or device).__name__, painter.pen().color().name(), painter.opacity())
             texts.append(Words(kind, str(args[-1]), device, _box(painter, args)))
         return draw(painter, *args, **options)
@@ -227,6 +237,11 @@ def painted_words(root: QWidget) -> list[Words]:
     return [words for words in texts if type(words.widget).__name__ not in ("SceneView", "SliceView")]
 
 
+def contrast_of(root: QWidget) -> float:
+    """Return the contrast of the words of a window that holds one text only."""
+    return _contrast(_pixels(root, root.rect().adjusted(5, 3, -5, -3), _SCALE))
+
+
 def menu_words(menu: QMenu) -> Iterator[tuple[str, float]]:
     """Yield the entries of a menu, with their contrast as they are and where the keyboard is on them."""
     menu.ensurePolished()
@@ -238,3 +253,66 @@ def menu_words(menu: QMenu) -> Iterator[tuple[str, float]]:
                 box = menu.actionGeometry(entry).adjusted(14, 4, -30, -4)
                 yield entry.text(), _contrast(_pixels(menu, box, _SCALE))
     menu.setActiveAction(None)
+
+
+class Walk:
+    """Looks at each state of a window once, at what is new in it in each theme, and keeps what it finds."""
+
+    def __init__(self, window: MainWindow) -> None:
+        self.window = window
+        self.found: dict[str, set[str]] = defaultdict(set)
+        self.seen: set[tuple[object, ...]] = set()
+
+    def look(self, state: str, root: QWidget) -> None:
+        if not root.isActiveWindow():
+            root.activateWindow()
+            QApplication.processEvents()
+        for widget in controls(root) if qtpy.PYSIDE6 else ():  # PyQt6 has nothing that says the names
+            name = spoken(widget)
+            if sum(map(str.isalnum, name)) < 2:
+                self.found["names"].add(f"{state}: {type(widget).__name__} {name!r}")
+        focusable = [each for each in self._focusable(root) if self._is_new(self._kind(each))]
+        words = [each for each in (*words_of(root), *painted_words(root)) if self._is_new(each.kind)]
+        if focusable or words:
+            for theme in THEMES:
+                self._look_in(theme, state, root, focusable, words)
+            self.window.set_theme("dark")
+        if root is not self.window and root.window() is root:
+            self._enlarge(state, root)
+
+    def _look_in(self, theme: str, state: str, root: QWidget, focusable: list, words: list) -> None:
+        if self.window.theme_name != theme:
+            self.window.set_theme(theme)
+            QApplication.processEvents()
+        for each in words:
+            ratio = each.contrast(root)
+            if ratio < WORD_CONTRAST:
+                self.found["words"].add(f"{state}, {theme}: {each.words!r} {each.kind} {ratio:.1f}")
+        for widget in focusable:
+            ratio = focus_contrast(widget, root)
+            if ratio < FOCUS_CONTRAST:
+                self.found["focus"].add(f"{state}, {theme}: {self._kind(widget)} {ratio:.1f}")
+
+    def _enlarge(self, state: str, root: QWidget) -> None:
+        """Find words of a dialog that do not grow with the text size of the window."""
+        before = {each.widget: QFontInfo(each.widget.font()).pixelSize() for each in words_of(root)}
+        self.window.set_text_size(LARGE)
+        QApplication.processEvents()
+        for widget, size in before.items():
+            if QFontInfo(widget.font()).pixelSize() < 0.9 * LARGE / 100 * size:
+                self.found["size"].add(f"{state}: {type(widget).__name__} {widget.property('role')}")
+        self.window.set_text_size(100)
+
+    def _focusable(self, root: QWidget) -> list[QWidget]:
+        policy = Qt.FocusPolicy.TabFocus
+        return [each for each in controls(root) if each.isEnabled() and each.focusPolicy() & policy]
+
+    def _kind(self, widget: QWidget) -> tuple[object, ...]:
+        roles = [widget.property("role"), widget.property("checked"), widget.styleSheet()]
+        is_qt = type(widget).__module__.startswith(("PySide6", "PyQt6"))
+        return ("focus", type(widget).__name__, *roles, "" if is_qt else widget.accessibleName())
+
+    def _is_new(self, kind: tuple[object, ...]) -> bool:
+        is_new = kind not in self.seen
+        self.seen.add(kind)
+        return is_new
