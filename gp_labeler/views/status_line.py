@@ -14,6 +14,7 @@ from gp_labeler.document.edits import point_text
 from gp_labeler.imaging.anatomical_frame import LETTERS
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.announcing import announce
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
 from gp_labeler.views.icons import icon
 from gp_labeler.views.panels.parts import breakable
@@ -33,6 +34,7 @@ _MARGIN, _ROOM = 12, 8
 
 _WIDEST_PLACE = "L 00.00  P 00.00  S 00.00 mm  ·  voxel 0000, 0000, 0000  ·  -32768"
 _WIDEST_FRAME = "Head frame, turned"
+_SIGNS = {"info": "", "warning": "Warning: ", "error": "Error: "}
 _MESSAGE_MS = {"info": 5000, "warning": 12000, "error": 0}
 
 
@@ -112,7 +114,12 @@ class StatusLine(QWidget):
         self._on_changed()
 
     def say(self, text: str, level: str = "info") -> None:
-        """Show a message in the middle for a while; an error until the next edit."""
+        """Show a message in the middle for a while, an error until the next edit; and tell screen readers.
+
+        A word says what its colour says, too.
+        """
+        text = f"{_SIGNS[level]}{text}"
+        announce(self.next_click, text, urgent=level != "info")
         self._show(breakable(text), {"info": "good"}.get(level, "danger" if level == "error" else level))
         if _MESSAGE_MS[level]:
             self._message_timer.start(_MESSAGE_MS[level])

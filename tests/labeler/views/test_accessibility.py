@@ -63,3 +63,18 @@ def test_each_state_of_a_point_has_a_shape_or_a_size_of_its_own() -> None:
         for state in drawn
     }
     assert len(shapes) == len(drawn)
+
+
+def test_a_message_says_by_a_word_what_its_colour_says_and_screen_readers_are_told(
+    one_window, monkeypatch
+) -> None:
+    QtGui = pytest.importorskip("PySide6.QtGui")
+    told = []
+    monkeypatch.setattr(
+        QtGui.QAccessible, "updateAccessibility", lambda e: told.append((e.message(), e.politeness().name))
+    )
+    for level, word in (("info", ""), ("warning", "Warning: "), ("error", "Error: ")):
+        one_window.workspace.say("the scan has no bone", level)
+        assert one_window.status.next_click.text() == f"{word}the scan has no bone"
+    texts = ["the scan has no bone", "Warning: the scan has no bone", "Error: the scan has no bone"]
+    assert told == list(zip(texts, ("Polite", "Assertive", "Assertive"), strict=True))
