@@ -15,8 +15,10 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QFontDatabase, QPainter, QPaintEvent
 from qtpy.QtWidgets import QApplication, QCheckBox, QDialog, QHBoxLayout, QLabel, QPushButton, QWidget
 from text_states import OWN, walk_states
+from window_cases import Answers, close
 
 from gp_labeler.views import fonts
+from gp_labeler.views.application import make_window as new_window
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.panels.parts import ElidedLabel, text_label
@@ -55,19 +57,24 @@ def looks(state: str) -> list[tuple[str | None, int, tuple[int, int], str]]:
 
 
 @pytest.fixture(scope="module")
-def found(one_window, tmp_path_factory) -> dict[str, set[str]]:
-    """What is wrong in any state of a window, by kind."""
-    walk = Walk(one_window)
+def found(qapp, tmp_path_factory) -> dict[str, set[str]]:
+    """What is wrong in any state of a window, by kind; the window is gone before other tests make theirs."""
+    window = new_window(None, atlas=False)
+    window.prompts = Answers()
+    window.resize(1100, 760)
+    window.show()
+    walk = Walk(window)
 
     def look(state: str, root: QWidget) -> None:
         if not WHOLE:
             walk.look(state, root)
-        walk.found["cut"] |= set(cut_in_looks(one_window, state, root))
+        walk.found["cut"] |= set(cut_in_looks(window, state, root))
         if len(looks(state)) > 1:
-            show_as_usual(one_window)
+            show_as_usual(window)
 
-    walk_states(one_window, tmp_path_factory.mktemp("states"), look)
+    walk_states(window, tmp_path_factory.mktemp("states"), look)
     fonts.use_family(None)
+    close(window)
     return walk.found
 
 
