@@ -37,7 +37,7 @@ from window_cases import image_bytes
 
 from gp_labeler.scene.colours import contrast
 from gp_labeler.views.main_window import MainWindow
-from gp_labeler.views.theme import THEMES
+from gp_labeler.views.theme import DARK, THEMES, Theme, apply_theme
 
 __all__ = ["WORD_CONTRAST", "Walk", "contrast_of", "menu_words", "painted_words", "words_of"]
 
@@ -71,7 +71,7 @@ def controls(root: QWidget) -> list[QWidget]:
         for widget in root.findChildren(QWidget)
         if widget.isVisible()
         and (isinstance(widget, _CONTROLS) or widget.focusPolicy() != Qt.FocusPolicy.NoFocus)
-        and not isinstance(widget, QHeaderView | QScrollBar)
+        and not isinstance(widget, QHeaderView | QLabel | QScrollBar)
         and not widget.objectName().startswith("qt_")
     ]
 
@@ -169,8 +169,8 @@ def _text(widget: QWidget) -> str:
         return widget.text() if widget.pixmap().isNull() else ""
     if isinstance(widget, QAbstractButton):
         return widget.text() if type(widget).__module__.startswith(("PySide6", "PyQt6")) else ""
-    if isinstance(widget, QLineEdit):
-        return widget.text() or widget.placeholderText()
+    if isinstance(widget, QLineEdit):  # of what is selected, the ground is another
+        return "" if widget.hasSelectedText() else widget.text() or widget.placeholderText()
     if isinstance(widget, QPlainTextEdit):
         return widget.toPlainText() or widget.placeholderText()
     return widget.currentText() if isinstance(widget, QComboBox) else ""
@@ -264,55 +264,70 @@ class Walk:
         self.seen: set[tuple[object, ...]] = set()
 
     def look(self, state: str, root: QWidget) -> None:
+        """Look at a state; a dialog keeps the look in which it was looked at last."""
         if not root.isActiveWindow():
-            root.activateWindow()
+            root.window().activateWindow()
             QApplication.processEvents()
         for widget in controls(root) if qtpy.PYSIDE6 else ():  # PyQt6 has nothing that says the names
             name = spoken(widget)
             if sum(map(str.isalnum, name)) < 2:
                 self.found["names"].add(f"{state}: {type(widget).__name__} {name!r}")
-        focusable = [each for each in self._focusable(root) if self._is_new(self._kind(each))]
-        words = [each for each in (*words_of(root), *painted_words(root)) if self._is_new(each.kind)]
-        if focusable or words:
-            for theme in THEMES:
-                self._look_in(theme, state, root, focusable, words)
-            self.window.set_theme("dark")
-        if root is not self.window and root.window() is root:
+        focusable = [each for each in _focusable(root) if self._is_new(_focus_kind(each))]
+        words = [each for each in words_of(root) if self._is_new(each.kind)]
+        painted = {each.words for each in painted_words(root) if self._is_new(each.kind)}
+        if focusable or words or painted:
+            for theme in THEMES.values():
+                self._show(root, theme)
+                again = [each for each in painted_words(root) if each.words in painted] if painted else []
+                self._look_in(f"{state}, {theme.name}", root, focusable, [*words, *again])
+            if not self._is_dialog(root):
+                self.window.set_theme("dark")
+        if self._is_dialog(root):
             self._enlarge(state, root)
 
-    def _look_in(self, theme: str, state: str, root: QWidget, focusable: list, words: list) -> None:
-        if self.window.theme_name != theme:
-            self.window.set_theme(theme)
-            QApplication.processEvents()
+    def _is_dialog(self, root: QWidget) -> bool:
+        return root.isWindow() and root is not self.window
+
+    def _show(self, root: QWidget, theme: Theme) -> None:
+        """Show a theme: in the whole window, or in a dialog alone, which is quicker."""
+        if self._is_dialog(root):
+            apply_theme(root, theme)
+        elif self.window.theme_name != theme.name:
+            self.window.set_theme(theme.name)
+        QApplication.processEvents()
+
+    def _look_in(self, state: str, root: QWidget, focusable: list[QWidget], words: list[Words]) -> None:
         for each in words:
             ratio = each.contrast(root)
             if ratio < WORD_CONTRAST:
-                self.found["words"].add(f"{state}, {theme}: {each.words!r} {each.kind} {ratio:.1f}")
+                self.found["words"].add(f"{state}: {each.words!r} {each.kind} {ratio:.1f}")
         for widget in focusable:
             ratio = focus_contrast(widget, root)
             if ratio < FOCUS_CONTRAST:
-                self.found["focus"].add(f"{state}, {theme}: {self._kind(widget)} {ratio:.1f}")
+                self.found["focus"].add(f"{state}: {_focus_kind(widget)} {ratio:.1f}")
 
     def _enlarge(self, state: str, root: QWidget) -> None:
-        """Find words of a dialog that do not grow with the text size of the window."""
+        """Find words of a dialog that do not grow with the text size."""
         before = {each.widget: QFontInfo(each.widget.font()).pixelSize() for each in words_of(root)}
-        self.window.set_text_size(LARGE)
+        apply_theme(root, DARK, text_scale=LARGE / 100)
         QApplication.processEvents()
         for widget, size in before.items():
             if QFontInfo(widget.font()).pixelSize() < 0.9 * LARGE / 100 * size:
                 self.found["size"].add(f"{state}: {type(widget).__name__} {widget.property('role')}")
-        self.window.set_text_size(100)
-
-    def _focusable(self, root: QWidget) -> list[QWidget]:
-        policy = Qt.FocusPolicy.TabFocus
-        return [each for each in controls(root) if each.isEnabled() and each.focusPolicy() & policy]
-
-    def _kind(self, widget: QWidget) -> tuple[object, ...]:
-        roles = [widget.property("role"), widget.property("checked"), widget.styleSheet()]
-        is_qt = type(widget).__module__.startswith(("PySide6", "PyQt6"))
-        return ("focus", type(widget).__name__, *roles, "" if is_qt else widget.accessibleName())
 
     def _is_new(self, kind: tuple[object, ...]) -> bool:
         is_new = kind not in self.seen
         self.seen.add(kind)
         return is_new
+
+
+def _focusable(root: QWidget) -> list[QWidget]:
+    policy = Qt.FocusPolicy.TabFocus
+    return [each for each in controls(root) if each.isEnabled() and each.focusPolicy() & policy]
+
+
+def _focus_kind(widget: QWidget) -> tuple[object, ...]:
+    """Return what the look of the focus depends on."""
+    looks = [widget.property("role"), widget.property("checked"), widget.styleSheet()]
+    is_qt = type(widget).__module__.startswith(("PySide6", "PyQt6"))
+    return ("focus", type(widget).__name__, *looks, "" if is_qt else widget.accessibleName())

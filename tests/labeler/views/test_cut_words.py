@@ -66,11 +66,11 @@ def found(qapp, tmp_path_factory) -> dict[str, set[str]]:
     walk = Walk(window)
 
     def look(state: str, root: QWidget) -> None:
-        if not WHOLE:
-            walk.look(state, root)
         walk.found["cut"] |= set(cut_in_looks(window, state, root))
         if len(looks(state)) > 1:
             show_as_usual(window)
+        if not WHOLE:
+            walk.look(state, root)
 
     walk_states(window, tmp_path_factory.mktemp("states"), look)
     fonts.use_family(None)
