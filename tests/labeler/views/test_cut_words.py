@@ -31,6 +31,8 @@ FAMILIES = ("DejaVu Sans", "Liberation Sans", "Noto Sans", "Inter")
 FULLEST = ("first page", "scan", "label, both sides", "pose, a mistouch", "atlas, tried out", "open a stack")
 TALL_MENUS = ((130, SMALL), (150, SMALL))
 """Text sizes at which menus are taller than a screen: they scroll there."""
+SCROLLS_SIDEWAYS = "DistanceMatrixView paints"
+"""A table of all pairs of landmarks is wider than any screen: it begins and ends in the middle of a column."""
 WHOLE = "GP_CUT_WORDS" in os.environ
 """Whether the whole matrix is walked, as ``tools/cut-words`` does."""
 
@@ -94,6 +96,7 @@ def cut_in_looks(window: MainWindow, state: str, root: QWidget) -> Iterator[str]
         lines = cut_words(root, own=OWN, screen=screen)
         if (size, screen) in TALL_MENUS:
             lines = [line for line in lines if not line.startswith("menu ")]
+        lines = [line for line in lines if not line.startswith(SCROLLS_SIDEWAYS)]
         yield from (f"{state}, {name}, {size} %, {screen}, {theme}: {line}" for line in lines)
 
 
