@@ -32,7 +32,7 @@ FULLEST = ("first page", "scan", "label, both sides", "pose, a mistouch", "atlas
 TALL_MENUS = ((130, SMALL), (150, SMALL))
 """Text sizes at which menus are taller than a screen: they scroll there."""
 SCROLLS_SIDEWAYS = "DistanceMatrixView paints"
-"""A table of all pairs of landmarks is wider than any screen: it begins and ends in the middle of a column."""
+"""A table of all pairs of landmarks is wider than any screen, and may end in the middle of a column."""
 WHOLE = "GP_CUT_WORDS" in os.environ
 """Whether the whole matrix is walked, as ``tools/cut-words`` does."""
 
