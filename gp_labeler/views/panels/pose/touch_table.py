@@ -177,8 +177,12 @@ class TouchTable(QTableView):
             self.edit_position(self.name_at(index))
 
     def event(self, event: QEvent) -> bool:  # noqa: D102
-        is_asked = event.type() is QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
-        if is_asked and _begins_number(event) and self.currentIndex().isValid():
+        if (
+            event.type() is QEvent.Type.ShortcutOverride
+            and isinstance(event, QKeyEvent)
+            and _begins_number(event)
+            and self.currentIndex().isValid()
+        ):
             event.accept()  # else the first digit of a position would be a command of the window
             return True
         return super().event(event)
