@@ -68,10 +68,11 @@ def search_planes(bone: Bone, report: Report) -> list[MidPlane]:
     found = []
     for n, start in enumerate(starts):
         report(0.6 + 0.3 * n / len(starts))
-        plane = refined_by_points(bone, start, (1.2 * clip, 0.35 * clip), 10, every=3)
+        plane = refined_by_points(bone, start, (1.2 * clip, 0.35 * clip), 8, every=4)
         found.append((_distance_score(bone, plane, clip / 2, every=2), plane))
     found.sort(key=lambda pair: pair[0])
-    finer = [refined_by_points(bone, plane, (0.5 * clip, 0.12 * clip), 14) for _, plane in found[:_FINER]]
+    likely = [plane for _, plane in found[:_FINER]]
+    finer = [refined_by_points(bone, plane, (0.5 * clip, 0.12 * clip), 10, every=2) for plane in likely]
     finer.sort(key=lambda plane: _distance_score(bone, plane, clip / 2))
     report(1.0)
     return distinct(finer, 3.0)

@@ -39,8 +39,12 @@ _WHOLE = (0.65, 0.7, 0.12)
 _PART = (0.82, 0.25, 0.05)
 """The same where much of the head is missing: agreement must be higher."""
 
-_GAIN = 0.15
-"""By how much the fit of grey values raises agreement or overlap at most; what is farther behind is left."""
+_CLEAR = (0.7, 0.45, 0.2)
+"""The same where some of it is missing, and no other plane comes near."""
+
+_GAIN, _LATE_GAIN = 0.15, 0.04
+"""By how much the fit of grey values raises agreement, overlap or margin at most, and the whole fit after the
+quick one; what is farther behind is left."""
 
 _THIN_MARGIN = 0.03
 
@@ -55,16 +59,15 @@ class _Found:
     def accepted(self) -> bool:
         return self._passes(0.0)
 
-    @property
-    def is_hopeless(self) -> bool:
-        """Whether a finer fit will not make it acceptable either."""
-        return not self._passes(_GAIN)
+    def is_hopeless(self, gain: float) -> bool:
+        """Whether a fit that raises each figure by so much will not make it acceptable either."""
+        return not self._passes(gain)
 
     def _passes(self, slack: float) -> bool:
         c = self.confidence
         return any(
             c.agreement + slack >= agreement and c.overlap + slack >= overlap and c.margin + slack >= margin
-            for agreement, overlap, margin in (_WHOLE, _PART)
+            for agreement, overlap, margin in (_WHOLE, _PART, _CLEAR)
         )
 
 
@@ -153,7 +156,7 @@ def _best_plane(bone: Bone, fine_islands: Callable[[], list[Bone]], report: Repo
     judged = [(agreement_of(bone, plane), plane) for plane in search_planes(bone, report.part(0.0, 0.6))]
     judged = judged[:_REFINED]
     found = _leading(bone, judged)
-    if found.is_hopeless:
+    if found.is_hopeless(_GAIN):
         return found
     values = GreyValues(_counterpart(bone, fine_islands()))
     least = found.confidence.agreement - _GAIN
@@ -163,7 +166,7 @@ def _best_plane(bone: Bone, fine_islands: Callable[[], list[Bone]], report: Repo
             plane = refined_by_grey_values(values, plane, quick=True)
             judged[n] = (agreement_of(bone, plane), plane)
     found = _leading(bone, judged)
-    if found.is_hopeless:
+    if found.is_hopeless(_LATE_GAIN):
         return found
     report(0.9)
     others = [pair for pair in judged if pair[1] is not found.plane]
