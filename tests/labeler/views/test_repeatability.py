@@ -6,7 +6,10 @@ import json
 
 import pytest
 from panel_cases import actions_of, cut_words, deliver, workspace_with_scan
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import QPushButton
 from repeated_cases import SITTINGS, write_repeated
+from window_cases import wait_until_idle
 
 from gp_core import load_specimens, reliability
 from gp_core.errors import GpError
@@ -92,6 +95,23 @@ def test_the_card_shows_uses_and_saves_what_was_measured(workspace, folder, qtbo
     assert (tmp_path / "a.csv").read_text().startswith("feature,intra_n_pairs")
     card.use.setChecked(False)
     assert workspace.atlas.labelling_error_text == "0.1 mm a coordinate, assumed"
+
+
+def test_show_opens_the_animal_at_the_disagreement(folder, one_window, qtbot):
+    window, workspace = one_window, one_window.workspace
+    workspace.reliability.measure([folder])
+    wait_until_idle(qtbot, window)
+    window.set_step("atlas")
+    card = window.findChild(RepeatabilityCard)
+    row = workspace.reliability.report.disagreements[0]
+    show = next(b for b in card.findings.findChildren(QPushButton) if b.text() == "Show")
+    qtbot.mouseClick(show, Qt.MouseButton.LeftButton)
+    wait_until_idle(qtbot, window)
+    active = workspace.labels.active
+    assert workspace.document.state.specimen == row.specimen
+    assert (active.side, active.code) == (row.side, row.code)
+    (point,) = workspace.references.points
+    assert row.code in point.name
 
 
 def test_two_labels_are_looked_at_together_but_not_while_labelling_blind(folder):
