@@ -127,7 +127,7 @@ def test_a_swap_says_which_suggestions_it_drops(suggested) -> None:
     workspace.labels.suggest(AWAY, radius_95=0.8, source="atlas", side=L, code="ZL")
     workspace.labels.swap(L, "MN", "ZL")
     assert suggested.status.next_click.text() == (
-        "The suggestions of MN and ZL were dropped; undo brings them back"
+        "Warning: The suggestions of MN and ZL were dropped; undo brings them back"
     )
     workspace.document.undo()
     assert status_of(suggested, "ZL") is PointState.SUGGESTED
