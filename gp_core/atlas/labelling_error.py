@@ -20,7 +20,7 @@ from gp_core.validation import FloatArray
 __all__ = ["LABELLING_NOISE_MM", "LabellingError"]
 
 LABELLING_NOISE_MM = 0.1
-"""Standard deviation of a label's error where nothing was measured: about a voxel, mm a coordinate."""
+"""Standard deviation of a label's error where nothing was measured: about a voxel, mm per coordinate."""
 
 _LARGEST_MM = 5.0
 _PRIOR_PAIRS = 10.0
@@ -95,9 +95,9 @@ class LabellingError:
 
     @property
     def text(self) -> str:
-        """Such as ``0.14 mm a coordinate, measured on 8 animals, 2 observers``."""
+        """Such as ``0.14 mm per coordinate, measured on 8 animals, 2 observers``."""
         how = f"measured on {self.source}" if self.source else "assumed"
-        return f"{self.other_mm:.2g} mm a coordinate, {how}"
+        return f"{self.other_mm:.2g} mm per coordinate, {how}"
 
     def as_dict(self) -> dict[str, Any]:
         """Return it for a JSON file.

@@ -11,6 +11,7 @@ from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.label_check import Finding, check_specimen
 from gp_core.cli.options import (
     Subparsers,
+    add_atlas,
     add_command,
     add_json,
     add_labelling_error,
@@ -50,7 +51,7 @@ def add(commands: Subparsers) -> None:
     parser.add_argument(
         "--side", choices=("L", "R"), help="side of a single file whose content and name do not give it"
     )
-    parser.add_argument("--atlas", nargs="+", default=["published"], metavar="ATLAS", help="as for estimate")
+    add_atlas(parser, default=["published"])
     add_labelling_error(parser)
     add_json(parser)
 

@@ -59,7 +59,12 @@ def add(commands: Subparsers) -> None:
         help="landmark files of labelled animals, or folders; default: drawn from perturbed atlases",
     )
     parser.add_argument(
-        "--groups", nargs="+", choices=GROUPS, default=list(GROUPS), help="which conditions; default: all"
+        "--groups",
+        nargs="+",
+        choices=GROUPS,
+        default=list(GROUPS),
+        metavar="GROUP",
+        help=f"which conditions, of {', '.join(GROUPS)}; default: all",
     )
     parser.add_argument(
         "--repeats", type=int, default=10, metavar="N", help="how often each side is touched; default: 10"

@@ -44,7 +44,7 @@ def add(commands: Subparsers) -> None:
         type=float,
         default=0.0,
         metavar="MM",
-        help="SD of a coordinate of each label; default: 0",
+        help="SD of each coordinate of a label; default: 0",
     )
     parser.add_argument("--replace", action="store_true", help="replace existing files")
     parser.add_argument(
@@ -58,7 +58,7 @@ def add(commands: Subparsers) -> None:
         type=float,
         default=0.1,
         metavar="MM",
-        help="SD of a coordinate of each touch; default: 0.1",
+        help="SD of each coordinate of a touch; default: 0.1",
     )
     add_seed(parser)
 

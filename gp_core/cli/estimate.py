@@ -14,6 +14,7 @@ from gp_core.atlas.fitting import fit_atlas
 from gp_core.cli.options import (
     AtlasSource,
     Subparsers,
+    add_atlas,
     add_command,
     add_json,
     add_names,
@@ -83,12 +84,7 @@ def add(commands: Subparsers) -> None:
     )
     add_names(parser)
     parser.add_argument("--side", choices=("L", "R"), help="side of the head; needed with a file of touches")
-    parser.add_argument(
-        "--atlas",
-        nargs="+",
-        metavar="ATLAS",
-        help="published (default), an atlas file, or landmark files of labelled animals",
-    )
+    add_atlas(parser)
     parser.add_argument(
         "--method",
         metavar="METHOD",

@@ -61,7 +61,7 @@ def add(commands: Subparsers) -> None:
         nargs="?",
         const="",
         metavar="WEIGHTS",
-        help="weigh labels by their certainty; by default sure=1,fair=0.5,guess=0.2, and labels without one "
+        help="weight labels by their certainty; by default sure=1,fair=0.5,guess=0.2, and labels without one "
         "count as sure",
     )
     add_labelling_error(parser)
@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
         say(f"  Weights by certainty: {told}; {n} of {total} labels have one")
     if error is not None:
         say(f"  Labelling error in checks and expected regions: {error.text}")
-    say("  feature   SD between animals, mm a coordinate")
+    say("  feature   SD between animals, mm per coordinate")
     for code, sd in zip(atlas.codes, spread, strict=True):
         say(f"  {code:<9} {sd:5.2f}")
     return 0

@@ -24,6 +24,7 @@ from gp_core.standard_streams import standard_streams
 __all__ = [
     "AtlasSource",
     "Subparsers",
+    "add_atlas",
     "add_command",
     "add_json",
     "add_labelling_error",
@@ -207,6 +208,27 @@ def labellings(args: argparse.Namespace) -> list[Labelling]:
 def _which(args: argparse.Namespace) -> dict[str, Any]:
     chosen = {name: getattr(args, name, None) for name in ("observer", "round")}
     return {"names": lab_names(args), **chosen}
+
+
+def add_atlas(parser: argparse.ArgumentParser, *, more: str = "", default: list[str] | None = None) -> None:
+    """Add ``--atlas ATLAS``: published, a file, or labelled animals.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    more : str
+        What the help adds.
+    default : list of str, optional
+        The value without the option.
+    """
+    parser.add_argument(
+        "--atlas",
+        nargs="+",
+        default=default,
+        metavar="ATLAS",
+        help=f"published (default), an atlas file, or landmark files of labelled animals{more}",
+    )
 
 
 def add_labelling_error(parser: argparse.ArgumentParser) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from gp_core.cli.options import (
     Subparsers,
+    add_atlas,
     add_command,
     add_json,
     add_names,
@@ -51,13 +52,7 @@ def add(commands: Subparsers) -> None:
         help="the same skull features in the CT, with CA, CB, RWA and RWP",
     )
     parser.add_argument("--side", required=True, choices=("L", "R"), help="side of the head")
-    parser.add_argument(
-        "--atlas",
-        nargs="+",
-        default=["published"],
-        metavar="ATLAS",
-        help="as for estimate; JRMPC takes part where labelled animals are given",
-    )
+    add_atlas(parser, more=", which also allow the method jrmpc", default=["published"])
     parser.add_argument(
         "--bone",
         metavar="FILE",
@@ -65,7 +60,7 @@ def add(commands: Subparsers) -> None:
     )
     drawn = parser.add_argument_group("figure", "Figure 6 C and D of simulated sides, with the skull on it")
     add_figure(drawn)
-    drawn.add_argument("--n", type=int, default=1000, help="animals to simulate a side; default: 1000")
+    drawn.add_argument("--n", type=int, default=1000, help="animals to simulate per side; default: 1000")
     drawn.add_argument(
         "--noise", type=float, default=0.0, metavar="MM", help="SD of their touch errors; default: 0"
     )

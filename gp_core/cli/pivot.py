@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from gp_core.cli.options import Subparsers, add_command, add_json, save_json, say
-from gp_core.cli.touches import add_transforms
+from gp_core.cli.touches import RECORDING_HELP, add_transforms
 from gp_core.errors import blaming
 from gp_core.io.tracker_recordings import read_recording
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
@@ -33,8 +33,7 @@ def add(commands: Subparsers) -> None:
     parser.add_argument(
         "poses",
         metavar="FILE",
-        help="marker to tracker, mm: a sequence of PLUS or 3D Slicer (.igs.mha, .mha, .nrrd), or a table "
-        "with a 4x4 matrix or a quaternion in each row",
+        help=RECORDING_HELP,
     )
     add_transforms(parser)
     add_json(parser)

@@ -8,7 +8,7 @@ import sys
 from contextlib import suppress
 
 from gp_core.atlas.fitting import fit_atlas
-from gp_core.cli.options import Subparsers, add_command, read_atlas, say
+from gp_core.cli.options import Subparsers, add_atlas, add_command, read_atlas, say
 from gp_core.errors import blaming
 from gp_core.service import DEFAULT_PORT, PoseService
 
@@ -38,13 +38,7 @@ def add(commands: Subparsers) -> None:
         metavar="N",
         help="port; default: %(default)s; 0: any free port, which the first line tells",
     )
-    parser.add_argument(
-        "--atlas",
-        nargs="+",
-        default=["published"],
-        metavar="ATLAS",
-        help="as for estimate; with landmark files of labelled animals, the method jrmpc too",
-    )
+    add_atlas(parser, more=", which also allow the method jrmpc", default=["published"])
 
 
 def run(args: argparse.Namespace) -> int:

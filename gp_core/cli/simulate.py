@@ -51,13 +51,13 @@ def add(commands: Subparsers) -> None:
         example="gp-core simulate labelled/ --figure figure6cd.png --physical skull1.json skull2.json",
     )
     add_specimens(parser)
-    parser.add_argument("--n", type=int, default=1000, help="animals to draw a side; default: 1000")
+    parser.add_argument("--n", type=int, default=1000, help="animals to draw per side; default: 1000")
     parser.add_argument(
         "--noise",
         type=float,
         default=0.0,
         metavar="MM",
-        help="SD of the touch errors, mm a coordinate; default: 0",
+        help="SD of the touch errors, mm per coordinate; default: 0",
     )
     add_method(parser)
     add_features(parser)

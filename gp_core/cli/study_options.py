@@ -169,7 +169,7 @@ def add_seed(parser: argparse._ActionsContainer) -> None:
     parser : argparse.ArgumentParser
         The parser of one command.
     """
-    parser.add_argument("--seed", type=int, default=0, help="start of the random numbers; default: 0")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the random numbers; default: 0")
 
 
 def rng_of(args: argparse.Namespace) -> np.random.Generator:
@@ -205,7 +205,7 @@ def add_workers(parser: argparse.ArgumentParser, *, default: int | None = None) 
     default : int, optional
         Default number of workers.
     """
-    shown = "one a core" if default is None else f"{default}"
+    shown = "one per core" if default is None else f"{default}"
     parser.add_argument(
         "--workers", type=int, default=default, metavar="N", help=f"processes to use; default: {shown}"
     )

@@ -17,7 +17,13 @@ from gp_core.landmarks.labels import is_skull_feature, tidy_label
 from gp_core.pose.recorded_touches import recorded_touches
 from gp_core.validation import FloatArray
 
-__all__ = ["add", "add_transforms"]
+__all__ = ["RECORDING_HELP", "add", "add_transforms"]
+
+RECORDING_HELP = (
+    "marker to tracker, mm: a sequence of PLUS or 3D Slicer (.igs.mha, .mha, .nrrd), or a table with a 4x4 "
+    "matrix or a quaternion in each row"
+)
+"""What the commands say of the recordings that they read."""
 
 
 def add(commands: Subparsers) -> None:
@@ -35,7 +41,7 @@ def add(commands: Subparsers) -> None:
         summary="extract touches from a recorded probe: the places where its tip rested, in a given order",
         example="gp-core touches stylus.igs.mha --tip tip.json --order CL,MN,OS,RWA,RWP,LLI -o touches.csv",
     )
-    parser.add_argument("recording", metavar="RECORDING", help="as for pivot")
+    parser.add_argument("recording", metavar="RECORDING", help=RECORDING_HELP)
     parser.add_argument(
         "--tip",
         default="0,0,0",

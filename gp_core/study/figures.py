@@ -445,8 +445,8 @@ def comparison(report: ComparisonReport) -> Figure:
     figure.suptitle(report.animals, fontsize=9, color=_INK)
     axes[0].legend(fontsize=8, frameon=False, loc="upper left")
     figure.supxlabel(
-        "Touch errors (mm): Gaussian noise a coordinate; or noise 0.1 and one touch off its place.   "
-        "Dot mean, bar to 95 %, cross maximum",
+        "Touch errors (mm): Gaussian noise per coordinate, or noise of 0.1 and one displaced touch.   "
+        "Dot: mean; bar: to the 95th percentile; cross: maximum",
         fontsize=8,
         color=_INK,
     )

@@ -48,16 +48,20 @@ class Examination:
         for heading, found in self.found.items():
             text += [heading, *(f"  {line}" for line in found)]
         if not self.wrong:
-            return [*text, "Nothing is wrong"]
-        return [*text, "Wrong", *(f"  {number}. {line}" for number, line in enumerate(self.wrong, start=1))]
+            return [*text, "No problems found"]
+        return [
+            *text,
+            "Problems",
+            *(f"  {number}. {line}" for number, line in enumerate(self.wrong, start=1)),
+        ]
 
 
 def make_doctor_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler doctor``."""
     return CommandParser(
         prog="gp-labeler doctor",
-        description="Print what this machine has: versions, system libraries, display, OpenGL, fonts, state "
-        "folder; and what is wrong. Ends with 0, or with 2 where something is wrong.",
+        description="Check this machine and report problems: versions, system libraries, display, OpenGL, "
+        "fonts and the state folder. The exit status is 2 if there is a problem.",
     )
 
 
@@ -135,7 +139,7 @@ def _packages(found: Examination) -> None:
 def _libraries(found: Examination) -> None:
     lacking = missing(["app"])
     if not lacking:
-        found.note("System libraries", "all there")
+        found.note("System libraries", "all present")
         return
     found.note("System libraries", *(f"{need.name:24} missing" for need in lacking))
     found.wrong.append(f"System libraries are missing; {advice(lacking)}")

@@ -19,20 +19,10 @@ from gp_labeler.system.plain_numbers import use_plain_numbers
 __all__ = ["main", "make_parser"]
 
 _EXAMPLE = """examples:
-  gp-labeler                          the window
-  gp-labeler head.nrrd                the window with a scan, or a specimen saved before
-  gp-labeler --demo                   the window with a synthetic head
-  gp-labeler --offscreen demo --output out    the demo without a display
-  gp-labeler mesh head.nrrd -o head.ply      the bone surface; see gp-labeler mesh --help
-  gp-labeler phantom -o head.nrrd            a synthetic head with known truth; see gp-labeler phantom --help
-  gp-labeler straighten head.nrrd            pose of the head in its scan; see gp-labeler straighten --help
-  gp-labeler propose head.nrrd --like labelled/ -o suggested/    first labels; see gp-labeler propose --help
-  gp-labeler check-library labelled/         labels that contradict the other labelled scans
-  gp-labeler export GP-014.gpspecimen.json -o landmarks    landmark files; see gp-labeler export --help
-  gp-labeler list scans/              specimens and their progress; see gp-labeler list --help
-  gp-labeler contact-sheet scans/ -o sheets  every label for review; see gp-labeler contact-sheet --help
-  gp-labeler simulate-tracker         a simulated probe over OpenIGTLink, to practise with
-  gp-labeler doctor                   check this machine and report problems
+  gp-labeler                                  open the window
+  gp-labeler head.nrrd                        open a scan, or a saved specimen
+  gp-labeler --demo                           open a synthetic head
+  gp-labeler --offscreen demo --output out    run the demo without a display
 """
 
 
@@ -41,7 +31,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser = CommandParser(
         prog="gp-labeler",
         description="Label guinea-pig heads in micro-CT.",
-        epilog=_EXAMPLE,
+        epilog=f"{_EXAMPLE}\n{_commands()}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"gp-labeler {__version__}")
@@ -58,7 +48,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--state",
         type=Path,
         metavar="DIR",
-        help="folder for unsaved edits; default: a folder of the user",
+        help="folder for unsaved edits; default: in the user's state folder",
     )
     parser.add_argument(
         "--observer",
@@ -81,6 +71,12 @@ def make_parser() -> argparse.ArgumentParser:
     )
     desktop.add_argument("--remove-desktop", action="store_true", help="undo --install-desktop")
     return parser
+
+
+def _commands() -> str:
+    width = max(map(len, SUBCOMMANDS)) + 2
+    rows = (f"  {name:{width}}{command.summary}\n" for name, command in SUBCOMMANDS.items())
+    return f"commands (help: gp-labeler COMMAND --help):\n{''.join(rows)}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

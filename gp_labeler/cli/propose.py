@@ -83,7 +83,7 @@ def add_library_options(parser: argparse.ArgumentParser) -> None:
         "--templates",
         type=Path,
         metavar="DIR",
-        help="folder for prepared scans; default: a folder of the user",
+        help="folder for prepared scans; default: in the user's cache folder",
     )
     group.add_argument("--workers", type=int, default=1, metavar="N", help="processes to use; default: 1")
     group.add_argument(

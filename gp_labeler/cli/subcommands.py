@@ -46,17 +46,19 @@ class Subcommand:
 
 
 SUBCOMMANDS = {
-    "mesh": Subcommand("mesh", "mesh", "write the bone surface of a scan"),
+    "mesh": Subcommand("mesh", "mesh", "extract the bone surface of a scan"),
     "phantom": Subcommand("phantom", "phantom", "make a synthetic head with known truth"),
     "straighten": Subcommand("straighten", "straighten", "find how the head lies in its scan"),
     "propose": Subcommand("propose", "propose", "suggest the landmarks of scans from labelled scans"),
     "check-library": Subcommand(
         "check_library", "check_library", "find labels that contradict the other labelled scans"
     ),
-    "export": Subcommand("export", "export", "write the landmark files of a specimen"),
-    "list": Subcommand("specimens", "list", "list the specimens in folders and their progress"),
-    "contact-sheet": Subcommand("specimens", "contact_sheet", "make contact sheets of specimens, PDF"),
-    "simulate-tracker": Subcommand("simulate_tracker", "simulator", "serve a simulated probe"),
+    "export": Subcommand("export", "export", "export landmarks for 3D Slicer and gp-core"),
+    "list": Subcommand("specimens", "list", "list specimens and their progress"),
+    "contact-sheet": Subcommand("specimens", "contact_sheet", "make PDFs that show every label, for review"),
+    "simulate-tracker": Subcommand(
+        "simulate_tracker", "simulator", "serve a simulated probe over OpenIGTLink, to practise with"
+    ),
     "doctor": Subcommand("doctor", "doctor", "check this machine and report problems"),
 }
 """All of them."""

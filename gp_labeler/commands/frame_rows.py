@@ -87,13 +87,13 @@ def frame_rows() -> Iterator[Action]:
     yield row("head.by_landmarks", "Straighten by the placed landmarks", (),
               lambda w: w.head.straighten_by_landmarks(), _can_straighten,
               hint="Uses IN and a pair such as OI, or two pairs; refined by the symmetry of the bone")
-    yield row("head.midline", "Straighten: the crosshair is on the midline", (), _mark("midline"),
+    yield row("head.midline", "Mark the midline at the crosshair", (), _mark("midline"),
               hint="One of the three points that define the frame of the head")
-    yield row("head.left", "Straighten: the crosshair is on the left of a pair", (), _mark("left"),
+    yield row("head.left", "Mark the left of a pair at the crosshair", (), _mark("left"),
               hint="The same anatomical point on both sides, such as the edge of the ear canal")
-    yield row("head.right", "Straighten: the crosshair is on the right of a pair", (), _mark("right"),
+    yield row("head.right", "Mark the right of a pair at the crosshair", (), _mark("right"),
               hint="When all three points are set, the head is straightened")
-    yield row("head.forget_points", "Take the marked points away", (), lambda w: w.head.forget_points(),
+    yield row("head.forget_points", "Remove the marked points", (), lambda w: w.head.forget_points(),
               _has_points, hint="Midline, left and right: no head is straightened by them")
     yield row("head.by_hand", "Turn the head by hand", ("Ctrl+Shift+H",), _turn_by_hand,
               checked=lambda w: w.interaction.tool == "turn",

@@ -55,5 +55,5 @@ def measure_rows() -> Iterator[Action]:
     yield row("measure.import", "Import rulers and angles…", (), IN_WINDOW,
               hint="Line and angle markups of 3D Slicer (.mrk.json)", group="exchange")
     yield row("measure.export", "Export rulers and angles…", (), IN_WINDOW,
-              _has_measurements, hint="As line and angle markups of 3D Slicer, a file each", group="exchange")
+              _has_measurements, hint="One line or angle markup of 3D Slicer for each", group="exchange")
 # fmt: on

@@ -74,7 +74,7 @@ def read_labelled_scans(paths: Iterable[str | PathLike[str]]) -> LabelledScans:
             finding.take_specimen(file)
     finding.take_landmarks([file for file in files if not file.name.endswith(SUFFIX)])
     if not finding.scans:
-        why = "; ".join(skipped.text for skipped in finding.skipped[:3])
+        why = "; ".join(f"{each.what}: {each.why}" for each in finding.skipped[:3])
         raise GpError(
             f"there is no labelled scan among {len(files)} files{': ' if why else ''}{why}",
             remedy="Keep each scan beside its landmark files, under the specimen's name.",

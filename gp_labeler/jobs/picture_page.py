@@ -174,8 +174,8 @@ def picture_page(
     axes.set_anchor("N")
     for n, each in enumerate(blocks):
         _write(axes, each, *layout.corner(n), _LETTERS * layout.n_pictures)
-    figure.text(0.025, 0.965, title, fontsize=12, fontweight="bold", color=_INK)
-    figure.text(0.025, 0.02, legend, fontsize=7.5, color=_QUIET)
+    figure.text(0.02, 0.965, title, fontsize=12, fontweight="bold", color=_INK)
+    figure.text(0.02, 0.02, legend, fontsize=7.5, color=_QUIET)
     figure.text(0.975, 0.965, about, fontsize=7.5, color=_QUIET, ha="right")
     return figure
 

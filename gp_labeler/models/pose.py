@@ -407,7 +407,7 @@ class PoseModel:
         """Take the touches of a file for this side in place of those there are."""
         warnings = touching.load_touches(self._document, path, self.side)
         self._aim(self._first_untouched())
-        taken = f"Took {len(self._touched())} touches from {Path(path).name}"
+        taken = f"Read {len(self._touched())} touches from {Path(path).name}"
         self._messages.say(". ".join((taken, *warnings)), "warning" if warnings else "info")
 
     # What leaves

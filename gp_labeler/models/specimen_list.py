@@ -24,7 +24,7 @@ from gp_labeler.models.messages import Messages
 
 __all__ = ["FILTERS", "SpecimenListModel"]
 
-FILTERS = ("all", "unfinished", "not begun", "finished", "in doubt", "repeated", "with notes")
+FILTERS = ("all", "unfinished", "not begun", "finished", "doubtful", "repeated", "with notes")
 """Which specimens are shown."""
 
 _LISTING = "list specimens"
@@ -219,7 +219,7 @@ class SpecimenListModel:
             "unfinished": not row.is_finished,
             "not begun": not row.is_begun,
             "finished": row.is_finished,
-            "in doubt": bool(self.n_problems(row)) or bool(row.problem),
+            "doubtful": bool(self.n_problems(row)) or bool(row.problem),
             "repeated": len(row.labellings) > 1,
             "with notes": bool(row.notes) or row.n_notes > 0,
         }

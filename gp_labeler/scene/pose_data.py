@@ -118,7 +118,7 @@ class DrawnPose:
     def of_reading(cls, reading: Hypothesis, T_scan_touches: RigidTransform) -> DrawnPose:
         """Bring another reading of the touches into the scan, dotted."""
         turn = np.kron(np.eye(2), T_scan_touches.rotation)
-        percent = f"{reading.probability:.0%}" if reading.probability >= 0.01 else "< 1%"
+        percent = f"{100 * reading.probability:.0f} %" if reading.probability >= 0.01 else "< 1 %"
         return cls(
             f"{reading.side.value} {reading.label}",
             T_scan_touches.matrix @ reading.transform_to_touches.matrix,

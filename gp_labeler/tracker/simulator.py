@@ -38,7 +38,7 @@ __all__ = ["main", "make_parser"]
 
 _PROG = "python -m gp_labeler.tracker.simulator"
 
-_COMMANDS = """commands, one a line, in a script or typed with --live:
+_COMMANDS = """commands, one per line, in a script or typed with --live:
   go NAME [SECONDS]            send the tip to a point, or home
   lift [MM] [SECONDS]          lift it off
   wait SECONDS
@@ -205,30 +205,66 @@ def make_parser(prog: str = _PROG) -> argparse.ArgumentParser:
         epilog=_COMMANDS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--port", type=int, default=DEFAULT_PORT, help="port; 0: any free port")
+    parser.add_argument(
+        "--port", type=int, default=DEFAULT_PORT, help="port; default: %(default)s; 0: any free port"
+    )
     head = parser.add_argument_group("the head")
     head.add_argument(
         "--touches", type=Path, metavar="FILE", help="points to touch; default: those of a simulated animal"
     )
-    head.add_argument("--side", default="L", help="side of the head")
+    head.add_argument("--side", choices=("L", "R"), default="L", help="side of the head; default: L")
     head.add_argument("--seed", type=int, default=0, help="seed of the simulated animal and of the noise")
     head.add_argument("--truth", type=Path, metavar="JSON", help="write the true positions to this file")
     devices = parser.add_argument_group("the devices")
-    devices.add_argument("--probe", default="ProbeToTracker", metavar="NAME")
+    devices.add_argument(
+        "--probe", default="ProbeToTracker", metavar="NAME", help="name of the probe; default: %(default)s"
+    )
     devices.add_argument(
         "--reference", metavar="NAME", help="marker on the head; without it, the head does not move"
     )
-    devices.add_argument("--button", default="Button", metavar="NAME")
-    devices.add_argument("--tip", type=float, nargs=3, default=(0.0, 0.0, -120.0), metavar=("X", "Y", "Z"))
-    devices.add_argument("--noise", type=float, default=0.1, metavar="MM")
-    devices.add_argument("--noise-deg", type=float, default=0.02, metavar="DEG")
-    devices.add_argument("--sway", type=float, default=0.0, metavar="MM", help="amplitude of head motion")
-    devices.add_argument("--rate", type=float, default=60.0, metavar="HZ")
     devices.add_argument(
-        "--hidden", choices=HIDDEN_BY, default="status", help="how a hidden marker is reported"
+        "--button", default="Button", metavar="NAME", help="name of the foot switch; default: %(default)s"
     )
     devices.add_argument(
-        "--messages", choices=POSE_KINDS, default="TRANSFORM", help="type of the messages; default: TRANSFORM"
+        "--tip",
+        type=float,
+        nargs=3,
+        default=(0.0, 0.0, -120.0),
+        metavar=("X", "Y", "Z"),
+        help="tip in the frame of the probe's marker, mm; default: 0 0 -120",
+    )
+    devices.add_argument(
+        "--noise",
+        type=float,
+        default=0.1,
+        metavar="MM",
+        help="SD of each coordinate of a marker; default: %(default)s",
+    )
+    devices.add_argument(
+        "--noise-deg",
+        type=float,
+        default=0.02,
+        metavar="DEG",
+        help="SD of its rotation about each axis; default: %(default)s",
+    )
+    devices.add_argument(
+        "--sway", type=float, default=0.0, metavar="MM", help="amplitude of head motion; default: 0"
+    )
+    devices.add_argument(
+        "--rate", type=float, default=60.0, metavar="HZ", help="messages per second; default: %(default)s"
+    )
+    devices.add_argument(
+        "--hidden",
+        choices=HIDDEN_BY,
+        default="status",
+        help="how a hidden marker is reported; default: %(default)s",
+    )
+    devices.add_argument(
+        "--messages",
+        choices=POSE_KINDS,
+        default="TRANSFORM",
+        metavar="TYPE",
+        help=f"type of the messages, of {', '.join(POSE_KINDS)}; default: TRANSFORM",
     )
     parser.add_argument("--script", type=Path, metavar="FILE", help="file with commands, repeated in a loop")
     parser.add_argument("--live", action="store_true", help="read commands from standard input")

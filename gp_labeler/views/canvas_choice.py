@@ -126,7 +126,7 @@ def canvas_for(
     if timing is None or timing.renderer != name:
         return CanvasChoice("painted", f"not measured yet on {name}", to_measure=True)
     kind = "native" if timing.native_ms < timing.painted_ms else "painted"
-    figures = f"painted {timing.painted_ms:.0f} ms, native {timing.native_ms:.0f} ms a frame"
+    figures = f"painted {timing.painted_ms:.0f} ms, native {timing.native_ms:.0f} ms per frame"
     return CanvasChoice(kind, f"faster on {name}: {figures}")
 
 

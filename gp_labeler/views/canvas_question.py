@@ -71,6 +71,6 @@ def _take(window: MainWindow, timing: CanvasTiming) -> None:
     window.memory.save()
     faster = "native" if timing.native_ms < timing.painted_ms else "painted"
     window.workspace.say(
-        f"3D canvas: painted {timing.painted_ms:.0f} ms, native {timing.native_ms:.0f} ms a frame; "
+        f"3D canvas: painted {timing.painted_ms:.0f} ms, native {timing.native_ms:.0f} ms per frame; "
         f"automatic uses {faster} from the next start"
     )

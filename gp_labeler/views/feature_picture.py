@@ -45,7 +45,8 @@ from gp_labeler.views.theme import THEMES, Theme, theme_of
 
 __all__ = ["FeaturePicture", "feature_picture", "ground_picture"]
 
-_MARGIN = 18.0
+_MARGIN, _BESIDE = 18.0, 24.0
+"""Kept free above and below, and for the directions at the sides; logical pixels."""
 _ROOMY = 180
 """Logical pixels: in a narrower picture only the feature itself is named."""
 
@@ -107,7 +108,7 @@ class _Shown:
         """Return what the picture of a feature shows at a size in logical pixels."""
         ground = ground_of(code)
         low, high = ground_schematic(ground, side).box_around(code)
-        room = np.array([width, height]) - 2 * _MARGIN
+        room = np.array([width - 2 * _BESIDE, height - 2 * _MARGIN])
         x, y = (low + high) / 2
         return cls(ground, side, width, height, float((room / (high - low)).min()), (float(x), float(y)))
 

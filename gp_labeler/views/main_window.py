@@ -8,12 +8,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
 
-from qtpy.QtCore import QByteArray, QEvent, QSize
-from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QResizeEvent
+from qtpy.QtCore import QByteArray, QEvent, QSize, Qt
+from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeyEvent, QResizeEvent
 from qtpy.QtWidgets import (
     QApplication,
     QBoxLayout,
     QHBoxLayout,
+    QLineEdit,
     QMainWindow,
     QStackedWidget,
     QVBoxLayout,
@@ -324,7 +325,17 @@ class MainWindow(QMainWindow):
     def event(self, event: QEvent) -> bool:  # noqa: D102
         if event.type() == QEvent.Type.ShortcutOverride:  # comes before a key is looked up
             self.commands.flush()
+            if self._ends_typing(event):
+                event.accept()
+                return True
         return super().event(event)
+
+    def _ends_typing(self, event: QEvent) -> bool:
+        """Whether a key is the Enter of a text field, and no command."""
+        if not isinstance(event, QKeyEvent) or not isinstance(self.focusWidget(), QLineEdit):
+            return False
+        plain = (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.KeypadModifier)
+        return event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and event.modifiers() in plain
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802
         super().resizeEvent(event)

@@ -100,8 +100,8 @@ class StatusLine(QWidget):
             return
         i, j, k = np.rint(volume.scan_to_voxel(position[None])[0]).astype(int)
         value = volume.value_at(position)
-        grey = "outside" if value is None else f"{value:.6g}"
-        self.where.setText(f"{where_text(position)}  ·  voxel {i}, {j}, {k}  ·  {grey}")
+        what = "outside the scan" if value is None else f"voxel {i}, {j}, {k}  ·  {value:.6g}"
+        self.where.setText(f"{where_text(position)}  ·  {what}")
 
     def _say_frame(self, *_: object) -> None:
         if self.frame.text() != self._workspace.view.frame_text:

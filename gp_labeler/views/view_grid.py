@@ -396,4 +396,4 @@ class ViewGrid(QWidget):
         self.frames[plane.value].header.say_where(words)
 
     def _say_threshold(self, threshold: float | None) -> None:
-        self.frames["3d"].header.say_where("" if threshold is None else f"bone from {value_text(threshold)}")
+        self.frames["3d"].header.say_where("" if threshold is None else f"bone above {value_text(threshold)}")

@@ -68,10 +68,16 @@ class VolumeError(GpError):
 
     @classmethod
     def of(cls, problems: Sequence[Problem], file: str | PathLike[str]) -> VolumeError:
-        """Make one error of several problems, with each remedy once."""
-        remedies = dict.fromkeys(problem.remedy for problem in problems if problem.remedy)
-        text = "; ".join(problem.text.rstrip(".") for problem in problems)
-        return cls(text, problems=problems, file=Path(file), remedy=" ".join(remedies) or None)
+        """Make one error of several problems, each before its remedy; a remedy of several comes once."""
+        told: dict[str, list[str]] = {}
+        for problem in problems:
+            own = problem.text.rstrip(".").removeprefix(f"{Path(file).name} ")  # the error names it already
+            told.setdefault(problem.remedy, []).append(own)
+        texts = ["; ".join(each) for each in told.values()]
+        texts[1:] = [text[:1].upper() + text[1:] for text in texts[1:]]
+        *earlier, (last, remedy) = zip(texts, told, strict=True)
+        said = " ".join([*(f"{text}. {way}".strip() for text, way in earlier), last])
+        return cls(said, problems=problems, file=Path(file), remedy=remedy or None)
 
 
 def names(files: Iterable[Path | str], most: int = 4) -> str:

@@ -156,6 +156,8 @@ class SlicePainter:
         if self._workspace.view.state.labels_visible:
             names += [name for layer in view.layers for name in layer.names(view.shown, ratio)]
             size = view.shown.size
+            free = 1.6 * self._text
+            names += [NameTag("", place, DARK.text, free) for place in self._letter_places(size, ratio)]
             paint_words(painter, place_names(names, size, ratio=ratio, text=self._text, halo=DARK.halo))
 
     @property
@@ -280,16 +282,21 @@ class SlicePainter:
             painter.drawEllipse(QPointF(*(pixel + 0.5)), HANDLE_PIXELS * ratio, HANDLE_PIXELS * ratio)
 
     def _paint_letters(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
-        width, height = shown.size
-        left, right, top, bottom = _edge_letters(self._workspace.view.frame, shown.plane)
-        inset = self._text * ratio
-        for letter, x, y in (
-            (left, inset, height / 2),
-            (right, width - inset, height / 2),
-            (top, width / 2, inset),
-            (bottom, width / 2, height - inset),
-        ):
+        letters = _edge_letters(self._workspace.view.frame, shown.plane)
+        for letter, (x, y) in zip(letters, self._letter_places(shown.size, ratio), strict=True):
             word_picture(letter, self._text, DARK.text, ratio).draw_about(painter, x, y)
+
+    def _letter_places(self, size: tuple[int, int], ratio: float) -> FloatArray:
+        """(4, 2) device pixels of the directions at the left, right, upper and lower edge."""
+        (width, height), inset = size, self._text * ratio
+        return np.array(
+            [
+                [inset, height / 2],
+                [width - inset, height / 2],
+                [width / 2, inset],
+                [width / 2, height - inset],
+            ]
+        )
 
     def _paint_filters(
         self, painter: QPainter, source: VolumeSlicer, shown: SliceViewport, ratio: float

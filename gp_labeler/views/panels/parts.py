@@ -34,6 +34,7 @@ __all__ = [
     "column_of_captions",
     "emptied",
     "fix_headers",
+    "lay_out_hidden",
     "open_at",
     "scrolled",
     "text_label",
@@ -185,6 +186,14 @@ def scrolled(content: QWidget, *, page: str = "") -> Scrolled:
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         area.setAccessibleName(page)
     return area
+
+
+def lay_out_hidden(content: QWidget) -> None:
+    """Bring up to date what a widget asks for: Qt lays out only what is shown."""
+    for widget in (*reversed(content.findChildren(QWidget)), content):  # children before their parents
+        layout = widget.layout()
+        if layout is not None:
+            layout.activate()
 
 
 class Card(QWidget):

@@ -166,7 +166,8 @@ class _RailButton(QAbstractButton):
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         words = text_width(self, *(f"{n} {step.title}" for n, step in enumerate(STEPS, 1)), bold=True)
-        added = min(text_width(self, f"{self._number} {self.text()}", bold=True), pixels(self, _LONGEST))
+        own = text_width(self, f"{self._number} {self.text()}", bold=True) + pixels(self, 8)
+        added = min(own, pixels(self, _LONGEST))
         width = max(max(words, added) + 2 * _PAD, pixels(self, 72))
         return QSize(width, self._icon_height + line_height(self) + 10)
 

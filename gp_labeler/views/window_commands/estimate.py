@@ -52,7 +52,7 @@ def ask_open_skull(workspace: Workspace, prompts: Prompts) -> None:
     """Ask for a landmark file that says where the skull features are on the scan."""
     for path in prompts.open_files("Skull features on the scan", POINTS):
         names = touching.load_skull(workspace.document, path)
-        workspace.say(f"Took {' '.join(names)} from {path.name}")
+        workspace.say(f"Read {' '.join(names)} from {path.name}")
 
 
 def show_tracker(window: MainWindow) -> None:

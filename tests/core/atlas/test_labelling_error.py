@@ -84,7 +84,7 @@ def test_a_feature_is_drawn_towards_all_features_by_ten_pairs() -> None:
     }
     error = LabellingError.from_reliability(report)
     assert error.of(["CA", "CB"]) == pytest.approx([np.sqrt((30 * 0.09 + 10 * 0.01) / 40), 0.1])
-    assert error.text == "0.1 mm a coordinate, measured on 5 animals, 2 observers"
+    assert error.text == "0.1 mm per coordinate, measured on 5 animals, 2 observers"
 
 
 def test_it_is_kept_in_the_atlas_file_and_absent_where_it_is_assumed(tmp_path) -> None:
@@ -161,7 +161,7 @@ def test_the_commands_take_both(tmp_path, capsys) -> None:
     assert main(["fit", str(tmp_path), "-o", str(atlas), *options]) == 0
     said = capsys.readouterr().out
     assert "Weights by certainty: sure 1, fair 0.5, guess 0.3; 38 of 114 labels have one" in said
-    assert "0.2 mm a coordinate, measured on 1 animal, 1 observer" in said
+    assert "0.2 mm per coordinate, measured on 1 animal, 1 observer" in said
     assert Atlas.load(atlas).labelling_error.other_mm == 0.2
     assert main(["check", str(tmp_path), "--labelling-error", str(error)]) in (0, 1)
     assert "Labelling error: 0.2 mm" in capsys.readouterr().out

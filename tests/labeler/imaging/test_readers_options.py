@@ -15,6 +15,7 @@ from gp_core.errors import GpError
 from gp_labeler.imaging import disk_cache
 from gp_labeler.imaging.progress import Cancelled
 from gp_labeler.imaging.readers import ImportOptions, inspect_volume, is_readable_name, read_volume
+from gp_labeler.imaging.readers.problems import Problem, VolumeError
 
 
 def write_paged(scan: Scan, path: Path) -> Path:
@@ -148,3 +149,20 @@ def test_names_of_scans_are_known_without_opening_them() -> None:
         assert is_readable_name(Path(name)), name
     for name in ("a.gz", "a.txt", "a.mrk.json", "a"):
         assert not is_readable_name(Path(name)), name
+
+
+def test_each_problem_of_a_file_comes_before_its_remedy() -> None:
+    problems = [
+        Problem("short-file", "a.nrrd holds 9 bytes, but 20 are needed", remedy="Copy it again."),
+        Problem("extent", "the scan would be 1 mm long", remedy="Give the voxel size."),
+        Problem("scaling", "it has no slope.", remedy="Copy it again."),
+    ]
+    said = str(VolumeError.of(problems, "scans/a.nrrd"))
+    assert said == (
+        "scans/a.nrrd: holds 9 bytes, but 20 are needed; it has no slope. Copy it again. "
+        "The scan would be 1 mm long. Give the voxel size."
+    )
+    assert str(VolumeError.of(problems[1:2], "a.nrrd")) == (
+        "a.nrrd: the scan would be 1 mm long. Give the voxel size."
+    )
+    assert str(VolumeError.of([Problem("odd", "it is odd")], "a.nrrd")) == "a.nrrd: it is odd"

@@ -61,7 +61,7 @@ def test_a_short_or_broken_isq_is_refused(tmp_path: Path) -> None:
     path = write_isq(cropped("int16"), tmp_path / "C1.isq")
     whole = path.read_bytes()
     path.write_bytes(whole[:-2])
-    with pytest.raises(VolumeError, match=r"C1.isq holds [\d,]+ bytes, but [\d,]+ are needed"):
+    with pytest.raises(VolumeError, match=r"C1.isq: holds [\d,]+ bytes, but [\d,]+ are needed"):
         read_volume(path)
     path.write_bytes(whole[:200])
     with pytest.raises(VolumeError, match="its header is incomplete"):

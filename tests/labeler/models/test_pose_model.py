@@ -88,7 +88,7 @@ def test_what_a_file_lacks_or_is_named_stays_said(workspace, animal, tmp_path):
     workspace.messages.said.connect(lambda text, level: said.append((text, level)))
     workspace.pose.target_changed.connect(lambda _: said.append("next"))
     workspace.pose.load(file)
-    text = "Took 6 touches from GP-7_Right.csv. Its name indicates the right side: check the side"
+    text = "Read 6 touches from GP-7_Right.csv. Its name indicates the right side: check the side"
     assert said[-1] == (text, "warning"), "nothing is said after it that takes its place"
     assert touching.named_side("Skull_Left_new.dat") is Side.LEFT
     assert touching.named_side("left and right.dat") is None

@@ -119,7 +119,7 @@ def test_another_reading_is_drawn_dotted_with_its_odds_and_its_own_region() -> N
     drawn = DrawnPose.of_reading(reading, T_scan_touches)
     np.testing.assert_allclose(drawn.origin, T_scan_touches.apply(reading.origin[None])[0])
     assert (drawn.style, drawn.side) == ("dotted", Side.LEFT)
-    assert drawn.label == f"100% {reading.label}"
+    assert drawn.label == f"100 % {reading.label}"
     shown = DrawnPose.of(found, T_scan_touches)
     assert (shown.cone, drawn.key != shown.key) == (found.plain_cone_95, True)
     assert found.radius_95 > 1.5 * found.plain_radius_95

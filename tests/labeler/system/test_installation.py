@@ -153,7 +153,7 @@ def test_the_doctor_finds_nothing_wrong_where_the_tests_run(tmp_path) -> None:
     assert done.returncode == 0, done.stdout
     for heading in ("Machine", "Packages", "System libraries", "Display", "Fonts", "OpenGL", "State folder"):
         assert f"\n{heading}\n" in f"\n{done.stdout}"
-    assert done.stdout.endswith("Nothing is wrong\n")
+    assert done.stdout.endswith("No problems found\n")
     assert done.stderr == ""
 
 
@@ -161,7 +161,7 @@ def test_the_doctor_says_all_that_is_wrong(tmp_path) -> None:
     (tmp_path / "file").write_text("")
     done = run(tmp_path, "doctor", QT_QPA_PLATFORM="nonesuch", XDG_STATE_HOME=str(tmp_path / "file"))
     assert done.returncode == 2
-    wrong = done.stdout.partition("\nWrong\n")[2].splitlines()
+    wrong = done.stdout.partition("\nProblems\n")[2].splitlines()
     assert len(wrong) == 2, done.stdout
     assert "nonesuch" in wrong[0]
     assert "Make it writable" in wrong[1]

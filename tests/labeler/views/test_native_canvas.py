@@ -188,7 +188,7 @@ def test_what_was_measured_is_remembered_and_what_failed_is_told(qtbot, one_wind
     )
     canvas_question.measure(one_window)
     qtbot.waitUntil(lambda: bool(told))
-    assert told[-1][1].startswith("3D canvas: painted 31 ms, native 12 ms a frame; automatic uses native")
+    assert told[-1][1].startswith("3D canvas: painted 31 ms, native 12 ms per frame; automatic uses native")
     timing = CanvasTiming.of(one_window.memory.fields("canvas_timing"))
     assert timing == CanvasTiming(HARDWARE, 31.0, 12.0)
     assert canvas_for("automatic", lambda: HARDWARE, timing).kind == "native"

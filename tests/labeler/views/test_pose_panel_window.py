@@ -65,6 +65,18 @@ def test_the_step_needs_no_scan(qtbot, bare, tmp_path):
     assert panel.isVisible()
 
 
+@pytest.mark.parametrize("step", ["pose", "atlas"])
+def test_views_lose_no_room_to_a_step_that_had_the_page_to_itself(qtbot, bare, step):
+    bare.resize(1280, 800)
+    usual = bare.panels.sizeHint().width()
+    to_step(qtbot, bare, step)
+    to_step(qtbot, bare, "scan")
+    bare.workspace.scan.begin(ball_volume())
+    wait_until_idle(qtbot, bare)
+    assert bare.panels.width() == usual
+    assert bare.grid.width() > usual
+
+
 def test_keys_are_commands_and_no_letters_of_the_specimens_name(qtbot, bare):
     name = bare.steps["pose"].head.specimen
     bare.activateWindow()

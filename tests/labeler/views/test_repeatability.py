@@ -94,7 +94,7 @@ def test_the_card_shows_uses_and_saves_what_was_measured(workspace, folder, qtbo
     assert json.loads((tmp_path / "a.json").read_text()) == report.as_dict()
     assert (tmp_path / "a.csv").read_text().startswith("feature,intra_n_pairs")
     card.use.setChecked(False)
-    assert workspace.atlas.labelling_error_text == "0.1 mm a coordinate, assumed"
+    assert workspace.atlas.labelling_error_text == "0.1 mm per coordinate, assumed"
 
 
 def test_show_opens_the_animal_at_the_disagreement(folder, one_window, qtbot):

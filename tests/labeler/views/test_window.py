@@ -59,7 +59,7 @@ def test_the_first_page_gives_way_to_the_scan(qtbot, make_window, ball) -> None:
     assert window.windowTitle().startswith("ball")
     assert window.rail.step == "label"
     assert window.status.next_click.text() == "Click on bone or a slice to place CA left"
-    assert "bone from" in window.grid.frames["3d"].header.where.text()
+    assert "bone above" in window.grid.frames["3d"].header.where.text()
     assert window.grid.frames["axial"].header.where.text().startswith("S 30")
 
 

@@ -334,7 +334,7 @@ def test_hovering_tells_position_voxel_and_value(window) -> None:
     assert "voxel" in window.status.where.text()
     assert window.status.where.text().endswith("1400")
     QTest.mouseMove(view, QPoint(1, 1))
-    assert window.status.where.text().endswith("outside")
+    assert window.status.where.text().endswith("outside the scan")
 
 
 def test_a_resting_pointer_tells_what_comes_to_lie_under_it(window, scene, qtbot) -> None:

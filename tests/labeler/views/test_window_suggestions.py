@@ -73,6 +73,26 @@ def test_enter_from_afar_brings_the_view_there_and_only_then_confirms(qtbot, sug
     np.testing.assert_array_equal(suggested.workspace.document.landmarks(L)["MN"], INSIDE)
 
 
+def test_enter_in_a_text_field_ends_typing_and_letters_are_commands_again(qtbot, suggested) -> None:
+    panel, document = suggested.steps["label"], suggested.workspace.document
+    name = panel.observer.name
+    name.setFocus()
+    QTest.keyClicks(name, "AB")
+    QTest.keyClick(name, Qt.Key.Key_Return)
+    assert document.author == "AB"
+    assert "Is MN left correct?" not in suggested.status.next_click.text()
+    assert suggested.focusWidget() is panel.table.view
+    suggested.workspace.labels.place(AWAY, How.SLICE, side=L, code="CA")
+    suggested.workspace.labels.go_to(L, "CA")
+    note = panel.card.annotation.note
+    note.setFocus()
+    QTest.keyClicks(note, "fluid")
+    QTest.keyClick(note, Qt.Key.Key_Return)
+    assert document.state.landmark(L, "CA").note == "fluid"
+    QTest.keyClick(suggested.focusWidget(), Qt.Key.Key_K)
+    assert document.state.landmark(L, "CA").checked
+
+
 def test_enters_without_a_picture_in_between_confirm_nothing(qtbot, suggested) -> None:
     workspace, axial = suggested.workspace, axial_of(suggested)
     workspace.labels.suggest(AWAY, radius_95=0.8, source="atlas", side=L, code="ZL")
@@ -97,7 +117,7 @@ def test_the_next_suggestion_comes_up_close_and_one_enter_confirms_it(qtbot, sug
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_X)  # cannot be seen: goes on too
     assert workspace.labels.active.code == "ZL"
-    assert axial.across_mm <= 12.0
+    assert axial.across_mm <= 12.0 + 1e-9  # whatever the width of the view, which rounds
     np.testing.assert_allclose(axial.pixel_at(AWAY), (axial.width() / 2, axial.height() / 2), atol=1.0)
     wait_until_idle(qtbot, suggested)
     QTest.keyClick(axial, Qt.Key.Key_Return)
@@ -307,7 +327,9 @@ def test_it_has_a_shape_of_its_own_everywhere(suggested) -> None:
     table = suggested.steps["label"].table
     row = [table.model.index(n, 1) for n in range(table.model.rowCount())]
     assert "suggested" in [index.data() for index in row]
-    assert table.model.headerData(1, Qt.Orientation.Horizontal) == "Left 0 \N{BALLOT BOX}1"
+    assert table.model.headerData(1, Qt.Orientation.Horizontal) == "Left 0 + 1"
+    tip = table.model.headerData(1, Qt.Orientation.Horizontal, Qt.ItemDataRole.ToolTipRole)
+    assert tip == "0 placed, 1 suggested"
     axial = axial_of(suggested)
     axial.zoom_to(INSIDE, 10.0)
     x, y = (int(n) for n in axial.pixel_at(INSIDE))

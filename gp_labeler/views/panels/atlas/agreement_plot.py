@@ -66,8 +66,8 @@ class AgreementPlot(QWidget):
         painter.drawText(named, Qt.AlignmentFlag.AlignCenter, panel.direction)
         low, high = panel.mean_range
         below = QRectF(area.left(), area.bottom() + 2, area.width(), line)
-        painter.drawText(below, Qt.AlignmentFlag.AlignLeft, f"{low:.1f}")
-        painter.drawText(below, Qt.AlignmentFlag.AlignRight, f"{high:.1f} mm")
+        painter.drawText(below, Qt.AlignmentFlag.AlignLeft, _text(low))
+        painter.drawText(below, Qt.AlignmentFlag.AlignRight, f"{_text(high)} mm")
         for value in (-panel.largest, 0.0, panel.largest) if has_scale else ():
             y = _height(area, value, panel.largest)
             words = QRectF(0, y - line / 2, left - 2, line)

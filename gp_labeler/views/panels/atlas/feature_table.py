@@ -32,7 +32,7 @@ from gp_labeler.views.theme import theme_of
 __all__ = ["FeatureTable", "FeatureTableModel"]
 
 _SIDES = (Side.LEFT, Side.RIGHT)
-_HEADINGS = ("Feature", "SD mm", "Left mm · SD", "Right mm · SD")
+_HEADINGS = ("Feature", "SD, mm", "Left, mm · SD", "Right, mm · SD")
 _HINTS = (
     "",
     "Variation between animals: standard deviation of a coordinate, mm",

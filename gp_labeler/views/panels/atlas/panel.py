@@ -224,7 +224,7 @@ class AtlasFittingCard(Card):
         )
         self.keep_doubtful.toggled.connect(self._keep_doubtful)
         self.add(self.keep_doubtful)
-        self.weigh_certainty = QCheckBox("Weigh labels by certainty")
+        self.weigh_certainty = QCheckBox("Weight labels by certainty")
         self.weigh_certainty.setToolTip("Weights: fair 1/2, guess 1/5, all others 1")
         self.weigh_certainty.toggled.connect(workspace.atlas.set_weigh_certainty)
         self.add(self.weigh_certainty)
@@ -394,7 +394,7 @@ class LeaveOneOutCard(Card):
         self._on_jobs()
         if trial is None:
             return
-        for column, words in enumerate(("", "CO mm", "max", "axis °", "max")):
+        for column, words in enumerate(("", "CO, mm", "max", "axis, °", "max")):
             self._grid.addWidget(_figure(words, "hint"), 0, column)
         for row, texts in enumerate(self.figures, 1):
             for column, words in enumerate(texts):

@@ -20,11 +20,11 @@ from gp_labeler.views.signals import attempt, blocked, follow
 
 __all__ = ["RepeatabilityCard"]
 
-_HEADINGS = ("Feature", "Within mm", "Between mm", "TEM mm", "ICC(2,1)")
+_HEADINGS = ("Feature", "Intra, mm", "Inter, mm", "TEM, mm", "ICC(2,1)")
 _HINTS = (
     "All: all features together",
-    "Mean distance of two labels by one observer, mm",
-    "Mean distance of two labels by two observers, mm",
+    "Intra-observer: mean distance of two labels by one observer, mm",
+    "Inter-observer: mean distance of two labels by two observers, mm",
     "Technical error of measurement, mm: between observers, else within one",
     "Intraclass correlation of observers, absolute agreement",
 )
@@ -111,6 +111,7 @@ class RepeatabilityCard(Card):
             item = table.horizontalHeaderItem(column)
             if item is not None:
                 item.setToolTip(hint)
+                item.setTextAlignment(_alignment(column))
         fit(table, lambda: self._fit(table))
         return table
 
@@ -125,8 +126,7 @@ class RepeatabilityCard(Card):
         for n, row in enumerate(rows):
             for column, words in enumerate(_cells(row)):
                 item = QTableWidgetItem(words)
-                side = Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft
-                item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
+                item.setTextAlignment(_alignment(column))
                 font = item.font()
                 font.setBold(n == 0)
                 item.setFont(font)
@@ -147,6 +147,12 @@ class RepeatabilityCard(Card):
 
     def _use(self, use: bool) -> None:
         attempt(self._workspace, lambda: self._workspace.reliability.use_error(use))
+
+
+def _alignment(column: int) -> Qt.AlignmentFlag:
+    """Return how a column is aligned, with its heading: numbers stand one below the other."""
+    side = Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft
+    return side | Qt.AlignmentFlag.AlignVCenter
 
 
 def _summary(report: ReliabilityReport) -> str:

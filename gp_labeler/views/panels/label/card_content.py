@@ -150,7 +150,7 @@ _ACTIONS = {
     PointState.SUGGESTED: ("confirm", "Confirm"),
     PointState.PLACED: ("check", "Mark as checked"),
     PointState.CHECKED: ("next", "Next feature"),
-    PointState.DOUBTFUL: ("check", "It is right"),
+    PointState.DOUBTFUL: ("check", "It is correct"),
     PointState.UNSEEN: ("crosshair", "Place at crosshair"),
 }
 

@@ -116,6 +116,8 @@ class LabellingsDialog(QDialog):
         self.again.setEnabled(bool(name) and self._workspace.document.in_use)
         said = f"Begin {labelling_text(name, next_round(state, name))}, blind"
         self.again.setText(said if name else "Label again, blind")
+        lacking = "" if name else "Type your name or initials first"
+        self.again.setToolTip(lacking if self._workspace.document.in_use else "Open a scan first")
 
     def _chosen(self) -> LabellingRow | None:
         chosen = self.table.selectionModel().selectedRows()

@@ -248,7 +248,7 @@ class _ChipDelegate(QStyledItemDelegate):
         is_over = bool(option.state & QStyle.StateFlag.State_MouseOver)
         if bool(index.data(ACTIVE_ROLE)) or (is_row and index.column() == 0):
             painter.fillRect(box, QColor(theme.selected))
-        elif is_over:
+        elif is_over or is_row:
             painter.fillRect(box, QColor(theme.hover))
         if view.hasFocus() and view.currentIndex() == index:
             painter.setPen(QPen(QColor(theme.focus), 2))
@@ -286,7 +286,8 @@ class _ChipDelegate(QStyledItemDelegate):
         draw_chip(painter, shape, chip, theme)
         painter.setFont(font_of(view))
         painter.setPen(theme.state(shape))
-        words = box.adjusted(_PAD + side + 4, 0, 0, 0)
-        painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, str(index.data()))
+        words, said = box.adjusted(_PAD + side + 4, 0, 0, 0), str(index.data())
+        painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, said)
         if index.data(LOCKED_ROLE):
-            draw_chip(painter, "locked", chip.translated(box.right() - side - chip.left(), 0), theme)
+            end = words.left() + text_width(view, said) + 4
+            draw_chip(painter, "locked", chip.translated(end - chip.left(), 0), theme)

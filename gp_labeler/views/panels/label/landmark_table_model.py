@@ -17,9 +17,6 @@ __all__ = ["ACTIVE_ROLE", "CODE_ROLE", "LOCKED_ROLE", "SIDES", "STATE_ROLE", "La
 SIDES = (Side.LEFT, Side.RIGHT)
 """Of the columns after the first."""
 
-_SUGGESTED = "\N{BALLOT BOX}"
-"""Before a number of suggestions in the header: it has the shape of their chips."""
-
 _USER = int(Qt.ItemDataRole.UserRole)
 STATE_ROLE, ACTIVE_ROLE, LOCKED_ROLE, CODE_ROLE = (_USER + n for n in range(1, 5))
 
@@ -124,8 +121,8 @@ class LandmarkTableModel(QAbstractTableModel):
 
     def _heading(self, side: Side) -> str:
         progress = self._workspace.labels.progress(side)
-        if progress.n_suggested:  # both counts and the total would not fit
-            return f"{side.word.capitalize()} {progress.n_placed} {_SUGGESTED}{progress.n_suggested}"
+        if progress.n_suggested:  # the total would not fit too; the tool tip names both counts
+            return f"{side.word.capitalize()} {progress.n_placed} + {progress.n_suggested}"
         return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}"
 
     def _cell(self, code: str, side: Side, state: PointState) -> _Cell:

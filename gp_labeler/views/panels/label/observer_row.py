@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from gp_labeler.document.labelling_edits import labelling_text
@@ -25,6 +26,9 @@ class ObserverRow(QWidget):
         What its button does.
     """
 
+    named = Signal()
+    """The question was answered."""
+
     def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
@@ -32,7 +36,7 @@ class ObserverRow(QWidget):
         self.name.setPlaceholderText("Your name or initials")
         self.name.setAccessibleName("Observer")
         self.name.returnPressed.connect(self._keep)
-        self.keep = QPushButton("Keep")
+        self.keep = QPushButton("Save")
         self.keep.setToolTip("Stored on this computer; the name of your account is never used")
         self.keep.clicked.connect(self._keep)
         self._asked = QWidget()
@@ -78,4 +82,5 @@ class ObserverRow(QWidget):
         set_role(self.words, "warning" if is_other else "hint")
 
     def _keep(self) -> None:
-        attempt(self._workspace, lambda: self._workspace.set_observer(self.name.text()))
+        if attempt(self._workspace, lambda: self._workspace.set_observer(self.name.text())):
+            self.named.emit()

@@ -60,3 +60,9 @@ class LabelPanel(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(Scrolled(content))
         self.setFocusProxy(self.table.view)
+        self.observer.named.connect(self._leave_text)
+        self.card.annotation.note.returnPressed.connect(self._leave_text)
+
+    def _leave_text(self) -> None:
+        """Take the keys from a field once something was typed: letters are commands again."""
+        self.table.view.setFocus()

@@ -18,7 +18,7 @@ from qtpy.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.action_button import Actions, action_button
-from gp_labeler.views.panels.parts import Card, scrolled
+from gp_labeler.views.panels.parts import Card, lay_out_hidden, scrolled
 from gp_labeler.views.panels.pose.overlay_card import OverlayCard
 from gp_labeler.views.panels.pose.registration_card import RegistrationCard
 from gp_labeler.views.panels.pose.result_card import ResultCard
@@ -86,7 +86,8 @@ class PosePanel(QWidget):
         self.result.set_large(wide)
         self.touches.table.set_roomy(wide)
         self.overlay.setVisible(not wide)  # there is nothing to draw over
-        self._area.updateGeometry()  # which no layout asks for while the panel is hidden
+        lay_out_hidden(self)
+        self._area.updateGeometry()
 
     def add_card(self, card: QWidget) -> None:
         """Put a card under the estimate."""

@@ -18,9 +18,8 @@ from gp_labeler.views.signals import attempt, follow
 __all__ = ["EstimateSettingsCard"]
 
 _METHODS = {"robust": ("robust",), "jrmpc": ("jrmpc",), "both": ("robust", "jrmpc")}
-_SHARED = "Error common to all touches, mm"
-_EACH = "Touches of each feature"
-_MIDLINE = "Skull features in the mid-plane"
+_NOISE, _SHARED, _EACH = "Probe noise", "Shared error", "Touches per feature"
+_MIDLINE = "Mid-plane points"
 _HINTS = {
     "robust": "Uses the names of the touches, and down-weights a wrong one",
     "jrmpc": "The published method; needs an atlas fitted here to labelled animals",
@@ -48,14 +47,14 @@ class EstimateSettingsCard(Card):
         self.specimen.setToolTip("Its name in reports and exports")
         self.side = Segments({side.value: side.word.capitalize() for side in Side}, hints)
         self.method = Segments({**METHOD_NAMES, "both": "Both"}, _HINTS)
-        self.noise = NumberField("Probe noise", widest="automatic")
+        self.noise = NumberField(_NOISE, widest="automatic")
         self.noise.step = 0.05
         self.noise.setPlaceholderText("automatic")
         self.noise.setToolTip(
             "Error of an ordinary touch, mm for each coordinate; if empty, estimated from the touches"
         )
         self.found = text_label("", "hint")
-        self.shared = NumberField(_SHARED, widest="0.25")
+        self.shared = NumberField(f"{_SHARED}, mm", widest="0.25")
         self.shared.step = 0.05
         self.shared.setToolTip(
             "RMS length of one offset that all touches of the session share: of the tip, the reference "
@@ -134,37 +133,25 @@ class EstimateSettingsCard(Card):
         choices.addWidget(self.side, 2)
         choices.addWidget(self.method, 3)
         self._named = QWidget()
-        name, noise, shared, atlas = QHBoxLayout(self._named), QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
-        name.setContentsMargins(0, 0, 0, 0)
-        for row, caption in (
-            (name, "Specimen"),
-            (noise, "Probe noise"),
-            (atlas, "Atlas"),
+        self._in_plane = QWidget()
+        name, in_plane = QHBoxLayout(self._named), QHBoxLayout(self._in_plane)
+        noise, shared, each, atlas = (QHBoxLayout() for _ in range(4))
+        for row in (name, in_plane):
+            row.setContentsMargins(0, 0, 0, 0)
+        for row, caption, fields in (
+            (name, "Specimen", (self.specimen, self.new)),
+            (noise, _NOISE, (self.noise, self.found)),
+            (shared, _SHARED, (self.shared, text_label("mm", "hint"))),
+            (each, _EACH, (self.each,)),
+            (in_plane, _MIDLINE, (self.midline,)),
+            (atlas, "Atlas", (self.atlas, self.to_atlas)),
         ):
             row.setSpacing(6)
             row.addWidget(_caption(caption))
-        shared.setSpacing(6)
-        shared.addWidget(text_label(_SHARED, "hint"))
-        name.addWidget(self.specimen, 1)
-        name.addWidget(self.new)
-        noise.addWidget(self.noise)
-        noise.addWidget(self.found)
-        noise.addStretch(1)
-        shared.addWidget(self.shared)
-        shared.addStretch(1)
-        each = QHBoxLayout()
-        each.setSpacing(6)
-        each.addWidget(text_label(_EACH, "hint"))
-        each.addWidget(self.each)
-        each.addStretch(1)
-        self._in_plane = QWidget()
-        in_plane = QHBoxLayout(self._in_plane)
-        in_plane.setContentsMargins(0, 0, 0, 0)
-        in_plane.setSpacing(6)
-        in_plane.addWidget(text_label(_MIDLINE, "hint"))
-        in_plane.addWidget(self.midline, 1)
-        atlas.addWidget(self.atlas, 1)
-        atlas.addWidget(self.to_atlas)
+            for field in fields:
+                row.addWidget(field, int(field in (self.specimen, self.midline, self.atlas)))
+        for row in (noise, shared, each):
+            row.addStretch(1)
         for what in (
             self._named,
             choices,
@@ -203,5 +190,5 @@ class EstimateSettingsCard(Card):
 def _caption(name: str) -> QLabel:
     """Return what stands before a field: all as wide as the longest."""
     words = text_label(name, "hint")
-    fit(words, lambda: words.setFixedWidth(text_width(words, "Probe noise")))
+    fit(words, lambda: words.setFixedWidth(text_width(words, _EACH)))
     return words

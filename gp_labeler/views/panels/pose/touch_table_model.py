@@ -19,7 +19,7 @@ from gp_labeler.views.panels.pose.wording import fine_mm, parse_position, touch_
 __all__ = ["CLEAR", "NAME", "RESIDUAL", "ROW_ROLE", "USE", "XYZ", "TouchRow", "TouchTableModel"]
 
 NAME, XYZ, RESIDUAL, USE, CLEAR = range(5)
-_HEADINGS = ("Point", "x, y, z in mm", "Residual", "Use", "")
+_HEADINGS = ("Point", "x, y, z in mm", "Residual, mm", "Use", "")
 ROW_ROLE = int(Qt.ItemDataRole.UserRole) + 1
 
 Index = QModelIndex | QPersistentModelIndex

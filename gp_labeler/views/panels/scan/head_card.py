@@ -110,7 +110,7 @@ def head_text(workspace: Workspace) -> str:
     """Say how the head was straightened, and what of it is only a proposal."""
     head = workspace.head
     if head.is_running:
-        return "Searching the plane of symmetry…"
+        return "Searching for the plane of symmetry…"
     if workspace.interaction.tool == "turn":
         return (
             "Drag over a slice to turn the head about the crosshair: in the sagittal slice its pitch, in the "

@@ -21,6 +21,7 @@ from gp_labeler.document.specimen_list import ListedSpecimen
 from gp_labeler.imaging.thumbnail import THUMBNAIL_SIZE
 from gp_labeler.models.specimen_list import FILTERS
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import open_at, text_label
 from gp_labeler.views.panels.scan.specimen_table_model import COLUMNS, SpecimenTableModel
@@ -30,6 +31,8 @@ from gp_labeler.views.signals import attempt, blocked, follow
 __all__ = ["SpecimenListDialog"]
 
 _SHEETS = "Contact sheet (*.pdf)"
+_SHORT_NAMES, _LONG_NAMES = 80, 220
+"""What the column of names takes at least, and at most: the rest is left for notes; logical pixels."""
 
 
 class SpecimenListDialog(QDialog):
@@ -95,10 +98,18 @@ class SpecimenListDialog(QDialog):
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         header.setResizeContentsPrecision(50)  # hundreds of rows are not all measured
+        header.setSectionResizeMode(1, QHeaderView.ResizeMode.Interactive)
         header.setSectionResizeMode(len(COLUMNS) - 1, QHeaderView.ResizeMode.Stretch)
         header.setSortIndicator(-1, Qt.SortOrder.AscendingOrder)  # in the order of the files, until asked
         self.table.setSortingEnabled(True)
+        self.model.modelReset.connect(self._fit_names)
+        fit(self, self._fit_names)
         self.table.activated.connect(self._open_row)
+
+    def _fit_names(self) -> None:
+        """Give the names the room that they take, but leave some for what is wrong."""
+        names = self.table.sizeHintForColumn(1)
+        self.table.setColumnWidth(1, min(max(names, pixels(self, _SHORT_NAMES)), pixels(self, _LONG_NAMES)))
 
     def _make_filter(self) -> None:
         self.words = text_label("", "hint")

@@ -20,7 +20,7 @@ from gp_labeler.views.times import time_text
 
 __all__ = ["COLUMNS", "SpecimenTableModel"]
 
-COLUMNS = ("", "Specimen", "Left", "Right", "In doubt", "Labellings", "Last change", "Notes")
+COLUMNS = ("", "Specimen", "Left", "Right", "Doubtful", "Labellings", "Last change", "Notes")
 _HINTS = (
     "",
     "Double-click to open",
