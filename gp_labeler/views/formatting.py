@@ -10,6 +10,7 @@ from gp_core.landmarks.suggestion import Suggestion
 __all__ = [
     "NONE",
     "TIMES",
+    "capitalised",
     "degrees_text",
     "mm_text",
     "number_text",
@@ -24,6 +25,12 @@ NONE = "\N{EN DASH}"
 TIMES = " \N{MULTIPLICATION SIGN} "
 _MINUS = "\N{MINUS SIGN}"
 _AXES = (("L", "R"), ("P", "A"), ("S", "I"))
+
+
+def capitalised(text: str) -> str:
+    """Return a sentence with a capital letter, unless a file or a name begins it."""
+    first = text.partition(" ")[0]
+    return text[:1].upper() + text[1:] if first.isalpha() and first.islower() else text
 
 
 def number_text(value: float, digits: int, *, signed: bool = False) -> str:

@@ -16,6 +16,7 @@ from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.announcing import announce
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
+from gp_labeler.views.formatting import capitalised
 from gp_labeler.views.icons import icon
 from gp_labeler.views.panels.parts import breakable
 from gp_labeler.views.signals import follow
@@ -118,7 +119,7 @@ class StatusLine(QWidget):
 
         A word says what its colour says, too.
         """
-        text = f"{_SIGNS[level]}{text}"
+        text = capitalised(f"{_SIGNS[level]}{text}")
         announce(self.next_click, text, urgent=level != "info")
         self._show(breakable(text), {"info": "good"}.get(level, "danger" if level == "error" else level))
         if _MESSAGE_MS[level]:

@@ -20,6 +20,7 @@ from qtpy.QtWidgets import (
 )
 
 from gp_labeler.views.fonts import elided, fit, line_height, pixels, text_width
+from gp_labeler.views.formatting import capitalised
 from gp_labeler.views.icons import icon_pixmap
 from gp_labeler.views.theme import theme_of
 
@@ -67,6 +68,8 @@ def breakable(words: str) -> str:
 
 _BREAK = "\N{ZERO WIDTH SPACE}"
 _LONGEST_WORD = 34
+_LEAST_NAME = 42
+"""Of a name that is shortened, logical pixels."""
 
 
 class ElidedLabel(QLabel):
@@ -82,6 +85,7 @@ class ElidedLabel(QLabel):
             self.setProperty("role", role)
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.setMinimumWidth(_LEAST_NAME)  # else a layout may leave it none
         self.set_words(words)
 
     @property
@@ -97,7 +101,7 @@ class ElidedLabel(QLabel):
         self._shorten()
 
     def _shorten(self) -> None:
-        self.setText(elided(self.font(), self._words, max(self.width() - 2, 40)))
+        self.setText(elided(self.font(), self._words, max(self.width(), _LEAST_NAME) - 2))
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
         super().changeEvent(event)
@@ -348,7 +352,7 @@ class Notice(QWidget):
         row.addWidget(IconLabel(name, colour, 16), 0, Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout()
         column.setSpacing(1)
-        column.addWidget(text_label(breakable(words), wrap=True))
+        column.addWidget(text_label(breakable(capitalised(words)), wrap=True))
         if remedy:
             column.addWidget(text_label(breakable(remedy), "hint", wrap=True))
         row.addLayout(column, 1)

@@ -14,7 +14,7 @@ from gp_core.landmarks.labels import LabelNames
 from gp_labeler.document.lab_names import LabNamesMemory
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
-from gp_labeler.views.panels.parts import Notice
+from gp_labeler.views.panels.parts import ElidedLabel, Notice
 
 pytestmark = pytest.mark.any_binding
 
@@ -52,6 +52,9 @@ def test_unknown_names_are_chosen_once_and_remembered(workspace, parent, qtbot, 
     dialog = LandmarkImportDialog(workspace, [theirs], parent=parent)
     dialog.show()
     assert dialog.names.isVisible()
+    labels = dialog.names.findChildren(ElidedLabel)
+    assert [label.text() for label in labels] == ["Apex", "Base", "Apex R", "Bregma"]
+    assert all(label.width() >= label.fontMetrics().horizontalAdvance(label.text()) for label in labels)
     assert not dialog.take.isEnabled()
     _choose(dialog, "Apex", "CA")
     _choose(dialog, "Base", "CB")

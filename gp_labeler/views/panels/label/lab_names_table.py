@@ -48,7 +48,8 @@ class LabNamesTable(QWidget):
         self.load.setProperty("role", "link")
         self.load.clicked.connect(lambda: self.load_asked.emit())
         self._rows = QGridLayout()
-        self._rows.setColumnStretch(1, 1)
+        for column, share in enumerate((2, 3)):
+            self._rows.setColumnStretch(column, share)
         self._rows.setHorizontalSpacing(12)
         self._rows.setVerticalSpacing(6)
         foot = QHBoxLayout()

@@ -26,7 +26,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.tracker.address import DEFAULT_PORT
-from gp_labeler.views.fonts import field_width, fit
+from gp_labeler.views.fonts import field_width, fit, text_width
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, open_at, scrolled, text_label
 from gp_labeler.views.panels.tracker.card import tracker_role, tracker_words
@@ -330,7 +330,9 @@ class TrackerDialog(QDialog):
 
     def _tip_card(self) -> Card:
         card, form = Card("Probe tip"), _form()
-        form.addRow(_HINTS["tip"][0], self.fields["tip"])
+        caption = text_label(_HINTS["tip"][0])
+        fit(caption, lambda: caption.setMinimumWidth(text_width(caption, _HINTS["reference"][0])))
+        form.addRow(caption, self.fields["tip"])
         card.add(form)
         card.add(self.pivot_words)
         card.add(self.turned)
