@@ -45,7 +45,7 @@ from gp_labeler.views.theme import THEMES, Theme, theme_of
 
 __all__ = ["FeaturePicture", "feature_picture", "ground_picture"]
 
-_MARGIN, _BESIDE = 18.0, 24.0
+_MARGIN, _BESIDE = 26.0, 24.0
 """Kept free above and below, and for the directions at the sides; logical pixels."""
 _ROOMY = 180
 """Logical pixels: in a narrower picture only the feature itself is named."""

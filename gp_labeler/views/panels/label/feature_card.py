@@ -106,7 +106,7 @@ class FeatureCard(QWidget):
         self.refresh_hidden()
 
     def _make_widgets(self) -> None:
-        self._eyebrow, self._title = _label("eyebrow"), _label("title")
+        self._eyebrow, self._title = _label("eyebrow", wrap=True), _label("title")
         self._aside, self._definition = _label("shared"), _label("", wrap=True)
         self._where, self._status = _label("hint", wrap=True), _label("hint", wrap=True)
         self._mistakes = _label("hint", wrap=True)
