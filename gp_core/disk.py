@@ -342,7 +342,7 @@ def make_room(folder: AnyPath, files: Iterable[AnyPath], *, overwrite: bool) -> 
     there = [path for path in files if Path(path).exists()]
     if there and not overwrite:
         remedy = "Choose another folder, or overwrite it."
-        raise AlreadyExistsError("exists already", file=there[0], remedy=remedy)
+        raise AlreadyExistsError("already exists", file=there[0], remedy=remedy)
 
 
 @contextmanager

@@ -94,7 +94,7 @@ def frame_rows() -> Iterator[Action]:
     yield row("head.right", "Mark the right of a pair at the crosshair", (), _mark("right"),
               hint="When all three points are set, the head is straightened")
     yield row("head.forget_points", "Remove the marked points", (), lambda w: w.head.forget_points(),
-              _has_points, hint="Midline, left and right: no head is straightened by them")
+              _has_points, hint="Forgets the points marked on the midline, left and right")
     yield row("head.by_hand", "Turn the head by hand", ("Ctrl+Shift+H",), _turn_by_hand,
               checked=lambda w: w.interaction.tool == "turn",
               hint="Drag on a slice to rotate the head: pitch in the sagittal, roll in the coronal, "

@@ -94,7 +94,7 @@ def pose_rows() -> Iterator[Action]:
     yield row("touched_window", "Robot's y to the touched round window", (), _toggle_window,
               checked=_window_is_touched, group="estimate",
               hint="When off, y points to the round window predicted by the atlas: better for rough touches")
-    yield row("overlay", "Estimate over bone and slices", ("Y",), _toggle_overlay,
+    yield row("overlay", "Show the estimate over bone and slices", ("Y",), _toggle_overlay,
               checked=lambda w: w.pose.overlay.visible, group="look", icon="eye")
     yield row("along_axis", "Look along the axis", ("A",), IN_WINDOW, _in_scan,
               hint="Looking at the apex from outside, round window up", group="look")

@@ -195,7 +195,7 @@ class SpecimenStore:
             return
         if moves:
             remedy = "Choose another name, or overwrite it."
-            raise AlreadyExistsError("exists already", file=target, remedy=remedy)
+            raise AlreadyExistsError("already exists", file=target, remedy=remedy)
         if digest(target) != self._saved:
             raise GpError(
                 "was changed by another program after it was opened",

@@ -70,7 +70,7 @@ def test_they_come_back_from_slicers_files_to_the_last_bit(tmp_path):
         jsonschema.validate(content, SCHEMA)
     (markup,) = json.loads(files[1].read_text(encoding="utf-8"))["markups"]
     assert (markup["type"], markup["measurements"][0]["value"]) == ("Angle", 90.0)
-    with pytest.raises(GpError, match="exists already"):
+    with pytest.raises(GpError, match="already exists"):
         gp_core.write_measurements(tmp_path, written, specimen="GP-014")
 
 

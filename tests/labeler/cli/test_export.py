@@ -52,7 +52,7 @@ def test_nothing_is_replaced_unasked(tmp_path, capsys) -> None:
     file, out = _specimen(tmp_path), str(tmp_path / "out")
     assert main(["export", file, "-o", out]) == 0
     assert main(["export", file, "-o", out]) == 2
-    assert "exists already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     assert main(["export", file, "-o", out, "--replace"]) == 0
     assert main(["export", file, "-o", out, "--format", ".xyz"]) == 2
 

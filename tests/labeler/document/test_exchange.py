@@ -75,7 +75,7 @@ def test_what_is_missing_is_said(editing, tmp_path):
 
 def test_export_refuses_what_it_should(editing, tmp_path):
     export_landmarks(editing.document.state, tmp_path)
-    with pytest.raises(GpError, match=r"GP-014_L\.mrk\.json: exists already"):
+    with pytest.raises(GpError, match=r"GP-014_L\.mrk\.json: already exists"):
         export_landmarks(editing.document.state, tmp_path)
     export_landmarks(editing.document.state, tmp_path, overwrite=True)
     with pytest.raises(GpError, match="nothing is placed yet"):

@@ -308,7 +308,7 @@ def test_saving_over_what_is_not_ours_is_refused(tmp_path):
     file = other.save(tmp_path / "B")
     document = SpecimenDocument(new_specimen(tmp_path / "state"))
     document.do(SetNotes("mine"))
-    with pytest.raises(GpError, match=r"B\.gpspecimen\.json: exists already"):
+    with pytest.raises(GpError, match=r"B\.gpspecimen\.json: already exists"):
         document.save(file)
     with pytest.raises(InUseError):
         document.save(file, overwrite=True)
