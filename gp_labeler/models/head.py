@@ -116,8 +116,8 @@ class HeadModel:
             return ""
         towards = letter_of(self.frame.T_head_scan.rotation[0])
         return (
-            f"According to the file, left is towards {towards} of the scan; nothing in the scan can prove it, "
-            "because a head and its mirror image look alike. Check it against a mark on the animal."
+            f"According to the file, left is towards {towards} of the scan; nothing in the scan can prove "
+            "it, because a head and its mirror image look alike. Check it against a mark on the animal."
         )
 
     def wrong_sides(self, points: frozenset[tuple[Side, str]] | None = None) -> list[str]:
