@@ -48,8 +48,8 @@ class LabNamesTable(QWidget):
         self.load.setProperty("role", "link")
         self.load.clicked.connect(lambda: self.load_asked.emit())
         self._rows = QGridLayout()
-        for column, share in enumerate((2, 3)):
-            self._rows.setColumnStretch(column, share)
+        for number, share in enumerate((2, 3)):
+            self._rows.setColumnStretch(number, share)
         self._rows.setHorizontalSpacing(12)
         self._rows.setVerticalSpacing(6)
         foot = QHBoxLayout()
