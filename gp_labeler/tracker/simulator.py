@@ -215,6 +215,13 @@ def make_parser(prog: str = _PROG) -> argparse.ArgumentParser:
     head.add_argument("--side", choices=("L", "R"), default="L", help="side of the head; default: L")
     head.add_argument("--seed", type=int, default=0, help="seed of the simulated animal and of the noise")
     head.add_argument("--truth", type=Path, metavar="JSON", help="write the true positions to this file")
+    _add_devices(parser)
+    parser.add_argument("--script", type=Path, metavar="FILE", help="file with commands, repeated in a loop")
+    parser.add_argument("--live", action="store_true", help="read commands from standard input")
+    return parser
+
+
+def _add_devices(parser: argparse.ArgumentParser) -> None:
     devices = parser.add_argument_group("the devices")
     devices.add_argument(
         "--probe", default="ProbeToTracker", metavar="NAME", help="name of the probe; default: %(default)s"
@@ -266,9 +273,6 @@ def make_parser(prog: str = _PROG) -> argparse.ArgumentParser:
         metavar="TYPE",
         help=f"type of the messages, of {', '.join(POSE_KINDS)}; default: TRANSFORM",
     )
-    parser.add_argument("--script", type=Path, metavar="FILE", help="file with commands, repeated in a loop")
-    parser.add_argument("--live", action="store_true", help="read commands from standard input")
-    return parser
 
 
 if __name__ == "__main__":
