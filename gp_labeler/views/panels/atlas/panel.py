@@ -35,7 +35,7 @@ from gp_labeler.views.signals import blocked, follow
 
 __all__ = ["AtlasPanel"]
 
-_WIDEST = 1000
+_WIDEST = 1020
 _TWO_COLUMNS = 640
 """From which width there is room for two columns; logical pixels at the normal text size."""
 
