@@ -212,7 +212,7 @@ def make_parser(prog: str = _PROG) -> argparse.ArgumentParser:
     head.add_argument(
         "--touches", type=Path, metavar="FILE", help="points to touch; default: those of a simulated animal"
     )
-    head.add_argument("--side", choices=("L", "R"), default="L", help="side of the head; default: L")
+    head.add_argument("--side", default="L", metavar="L|R", help="side of the head; default: L")
     head.add_argument("--seed", type=int, default=0, help="seed of the simulated animal and of the noise")
     head.add_argument("--truth", type=Path, metavar="JSON", help="write the true positions to this file")
     _add_devices(parser)
