@@ -67,10 +67,13 @@ def points_of(positions: NDArray[Any]) -> vtkPoints:
     return points
 
 
-def cells_of(corners: NDArray[Any]) -> vtkCellArray:
-    """Return (M, n) point numbers as cells of n corners; like `points_of` without a copy."""
+def cells_of(corners: NDArray[Any], dtype: type[np.integer[Any]] = np.int64) -> vtkCellArray:
+    """Return (M, n) point numbers as cells of n corners; like `points_of` without a copy.
+
+    Cells that are only drawn can be `np.int32`, in half of the memory; `triangles_of` expects the other type.
+    """
     cells = vtkCellArray()
-    cells.SetData(corners.shape[1], to_vtk(np.asarray(corners, dtype=np.int64).ravel(), share=True))
+    cells.SetData(corners.shape[1], to_vtk(np.asarray(corners, dtype=dtype).ravel(), share=True))
     return cells
 
 

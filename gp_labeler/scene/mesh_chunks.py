@@ -77,7 +77,7 @@ class MeshChunk:
             number = flat.reshape(-1, 3)
         mesh = vtkPolyData()
         mesh.SetPoints(points_of(self._surface.points[used]))
-        mesh.SetPolys(cells_of(number))
+        mesh.SetPolys(cells_of(number, np.int32))
         if normals is not None:
             mesh.GetPointData().SetNormals(to_vtk(to_numpy(normals)[used], share=True))
         return mesh

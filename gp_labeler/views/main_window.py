@@ -34,6 +34,7 @@ from gp_labeler.models.view import ViewState
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.fonts import desktop_scale, nearest_text_size
+from gp_labeler.views.memory_return import MemoryReturn
 from gp_labeler.views.painting.measure_layer import MeasureLayer
 from gp_labeler.views.painting.reference_layer import ReferenceLayer
 from gp_labeler.views.panels.atlas.panel import AtlasPanel
@@ -123,6 +124,7 @@ class MainWindow(QMainWindow):
         self.rail, self.panels = Rail(workspace, self.commands.actions), PanelStack()
         self.pages, self.welcome = QStackedWidget(), Welcome(workspace, self.commands.actions)
         self.status = StatusLine(workspace)
+        self._memory_return = MemoryReturn(workspace, self)
         self._dock()
         self._listen()
         self._recall_place()
