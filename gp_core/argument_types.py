@@ -163,6 +163,8 @@ def _check(value: Any, hint: Any, name: str) -> None:
 
 def _fits(value: Any, hint: Any) -> bool:
     """Whether a value is of an annotated type; what is not understood fits."""
+    if type(value) is hint and hint is not int:  # as usual; a whole number may be too large
+        return True
     anything, origin, arguments = _parts(hint)
     if anything:
         return True

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from functools import cache
+from functools import cache, cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -368,7 +368,11 @@ class SpecimenState:
 
     def touched(self, side: Side | str) -> LandmarkSet:
         """Return the touches of one side that count, in their own frame; skull features in `extra`."""
-        return touched_set(self.touches, Side.parse(side))
+        return self._touched[Side.parse(side)]
+
+    @cached_property
+    def _touched(self) -> Mapping[Side, LandmarkSet]:
+        return {side: touched_set(self.touches, side) for side in Side}
 
     def landmark(self, side: Side | str, code: str) -> Landmark:
         """Return what is known of one point; see `point_key` for what it raises."""
