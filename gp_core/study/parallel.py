@@ -128,14 +128,16 @@ def open_executor(workers: int | None = None, scheduler: str | None = None) -> I
         # here: most commands need no processes
         from gp_core.study.worker_processes import interrupts_held, worker_context
 
-        with ProcessPoolExecutor(count, mp_context=worker_context()) as executor:
+        context = worker_context()
+        with ProcessPoolExecutor(count, mp_context=context) as executor:
             try:
                 with interrupts_held():  # each task starts a worker while none is idle
                     for _ in range(count):
                         executor.submit(int)
                 yield executor
             except BaseException:
-                executor.shutdown(cancel_futures=True)  # else leaving waits for all that was submitted
+                context.end_workers()  # else leaving waits for what runs, and for all that was submitted
+                executor.shutdown(cancel_futures=True)
                 raise
 
 

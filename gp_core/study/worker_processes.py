@@ -9,8 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import Any
 
-__all__ = ["interrupts_held", "worker_context"]
+__all__ = ["WorkerContext", "interrupts_held", "worker_context"]
 
 
 class _Worker(SpawnProcess):
@@ -25,21 +26,37 @@ class _Worker(SpawnProcess):
         super().run()
 
 
-class _WorkerContext(SpawnContext):
-    Process = _Worker
-
-
-def worker_context() -> SpawnContext:
-    """Return the multiprocessing context of the worker processes.
+class WorkerContext(SpawnContext):
+    """The multiprocessing context of the worker processes, for `concurrent.futures.ProcessPoolExecutor`.
 
     Workers are spawned, not forked: a fork would copy the locks of threads that it does not copy.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._workers: list[_Worker] = []
+
+    def Process(self, *args: Any, **options: Any) -> SpawnProcess:  # type: ignore[override]  # noqa: N802
+        """Return a new worker, as the executor asks for it."""
+        self._workers.append(_Worker(*args, **options))
+        return self._workers[-1]
+
+    def end_workers(self) -> None:
+        """End all workers at once, whatever they are at: one task of a study may take minutes."""
+        for worker in self._workers:
+            if worker.pid is not None:
+                worker.terminate()
+
+
+def worker_context() -> WorkerContext:
+    """Return a new context; it knows the workers that are started by it.
 
     Returns
     -------
-    multiprocessing.context.SpawnContext
-        For `concurrent.futures.ProcessPoolExecutor`.
+    WorkerContext
+        For one executor, or for processes of one's own.
     """
-    return _WorkerContext()
+    return WorkerContext()
 
 
 def _end_with_parent() -> None:
