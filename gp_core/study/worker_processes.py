@@ -37,7 +37,18 @@ class WorkerContext(SpawnContext):
         self._workers: list[_Worker] = []
 
     def Process(self, *args: Any, **options: Any) -> SpawnProcess:  # type: ignore[override]  # noqa: N802
-        """Return a new worker, as the executor asks for it."""
+        """Return a new worker, as the executor asks for it.
+
+        Parameters
+        ----------
+        *args, **options
+            As of `multiprocessing.Process`.
+
+        Returns
+        -------
+        multiprocessing.context.SpawnProcess
+            Not yet started.
+        """
         self._workers.append(_Worker(*args, **options))
         return self._workers[-1]
 
