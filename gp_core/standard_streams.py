@@ -23,11 +23,12 @@ from typing import Any
 
 from gp_core.errors import FileFormatError, GpError
 
-__all__ = ["STANDARD", "kind_of", "standard_streams"]
+__all__ = ["STANDARD", "kind_of", "shown_name", "standard_streams"]
 
 STANDARD = "-"
 
 _INPUT, _OUTPUT = "standard input", "standard output"
+_PREFIX = "gp-streams-"
 _CHUNK_BYTES = 1 << 20
 _HEAD_BYTES = 4096
 _MOST_BYTES = 200_000_000_000
@@ -90,7 +91,7 @@ def standard_streams(
     if not inputs and not outputs:
         yield
         return
-    with tempfile.TemporaryDirectory(prefix="gp-streams-") as folder, _named(folder):
+    with tempfile.TemporaryDirectory(prefix=_PREFIX) as folder, _named(folder):
         for name in inputs:
             values[name] = _replaced(values[name], _received(Path(folder)))
         for name in outputs:
@@ -101,6 +102,24 @@ def standard_streams(
         with contextlib.redirect_stdout(sys.stderr):
             yield
         _send(Path(str(values[outputs[0]])))
+
+
+def shown_name(path: str | os.PathLike[str]) -> str:
+    """Return the name of a file for people: ``standard input`` for what came from there.
+
+    Parameters
+    ----------
+    path : path-like
+        As an option names it while its command runs.
+
+    Returns
+    -------
+    str
+        Without folders.
+    """
+    file = Path(path)
+    is_stream = file.parent.name.startswith(_PREFIX) and file.name.startswith(_INPUT)
+    return _INPUT if is_stream else file.name
 
 
 def _is_standard(value: object) -> bool:

@@ -41,6 +41,7 @@ from gp_core.pose.insertion_path import UNITS, carry_path, read_path, rows_befor
 from gp_core.pose.mixture import Hypothesis
 from gp_core.pose.next_touch import TouchGain, gains
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
+from gp_core.standard_streams import shown_name
 from gp_core.validation import FloatArray
 
 __all__ = ["HELD_BACK", "add", "pose_table"]
@@ -214,7 +215,7 @@ def run(args: argparse.Namespace) -> int:
     held_back = answer["status"] == WITHHELD
     ambiguities = [reason["text"] for reason in answer["reasons"]]
     _write(args, pose, answer, path, held_back=held_back)
-    for line in pose_table(pose, Path(args.touches).name, next_touches):
+    for line in pose_table(pose, shown_name(args.touches), next_touches):
         say(line)
     for line in _ear_lines(pose):
         say(f"  {line}")
@@ -269,7 +270,7 @@ def _given_touches(args: argparse.Namespace) -> EstimateInputs:
         times=None,
         atlas=atlas,
         specimens=tuple(specimens or ()),
-        source=Path(args.touches).name,
+        source=shown_name(args.touches),
     )
 
 
@@ -324,7 +325,7 @@ def _with_other_ear(args: argparse.Namespace, given: _Given, pose: CochleaPose) 
         return pose
     with blaming(args.other_ear):
         touches = read_touches(args.other_ear, pose.side.other, names=lab_names(args))
-        source = Path(args.other_ear).name
+        source = shown_name(args.other_ear)
         inputs = replace(given.inputs, touches=touches, times=None, source=source, other_ear=None)
         return compare_with_other_ear(pose, EarInputs(inputs, args.midline or (), args.both_ears))
 
@@ -340,7 +341,7 @@ def _ear_lines(pose: CochleaPose) -> Iterator[str]:
 
 def _compared(pose: CochleaPose, stored: CochleaPose, file: str) -> str:
     """Say how an estimate differs from that of the file which it was made from."""
-    name = Path(file).name
+    name = shown_name(file)
     if np.array_equal(pose.transform, stored.transform) and pose.as_dict() == stored.as_dict():
         return f"identical to {name}"
     mm = float(np.linalg.norm(pose.origin - stored.origin))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from pathlib import Path
 
 from gp_core.cli.options import Subparsers, add_command, add_json, save_json, say
 from gp_core.cli.touches import RECORDING_HELP, add_transforms
 from gp_core.errors import blaming
 from gp_core.io.tracker_recordings import read_recording
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
+from gp_core.standard_streams import shown_name
 
 __all__ = ["add"]
 
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     with blaming(args.poses):
         found = calibrate_pivot(recording.poses)
     save_json(args.json, found.as_dict())
-    for line in _pivot_lines(found, Path(args.poses).name):
+    for line in _pivot_lines(found, shown_name(args.poses)):
         say(line)
     return 0
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from gp_core.io.tracker_recordings import read_recording
 from gp_core.landmarks.features import CODES, EXTERNAL, PROBE
 from gp_core.landmarks.labels import is_skull_feature, tidy_label
 from gp_core.pose.recorded_touches import recorded_touches
+from gp_core.standard_streams import shown_name
 from gp_core.validation import FloatArray
 
 __all__ = ["RECORDING_HELP", "add", "add_transforms"]
@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
     rows = [(name, place) for name, places in touches.items() for place in np.atleast_2d(places)]
     lines = [",".join((as_csv_cell(name), *map(repr, place.tolist()))) for name, place in rows]
     write_text(args.output, "\n".join(("name,x,y,z", *lines)) + "\n")
-    say(f"{len(rows)} touches from {Path(args.recording).name}, mm")
+    say(f"{len(rows)} touches from {shown_name(args.recording)}, mm")
     for name, place in rows:
         say(f"  {name:<5} " + " ".join(f"{value:10.3f}" for value in place))
     return 0

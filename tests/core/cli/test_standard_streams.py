@@ -42,7 +42,7 @@ def test_touches_in_a_pose_out_and_that_again_into_the_next_command(core: Core, 
     assert first.returncode == 0
     file = tmp_path / "pose.json"
     file.write_bytes(first.stdout)
-    assert b"Cochlea from standard input" in first.stderr
+    assert b"Cochlea from standard input, left side" in first.stderr
     second = core("estimate", "-", "--csv", "-", given=first.stdout)
     assert second.returncode == 0
     matrix = np.array([line.split(",") for line in second.stdout.decode().splitlines()], dtype=float)
