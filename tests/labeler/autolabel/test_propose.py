@@ -119,7 +119,7 @@ def test_a_pose_is_refined_until_it_stays():
     known, (volume, truth) = Template.of(labelled(0)).surface, small_head(7, turn=TURN)
     there = np.array(list(labelled(0).points.values()))
     found = pose_from_points(volume, known, np.array(list(truth.values())), there)
-    off = Rotation.from_rotvec(np.radians([0, 24, 0])).as_matrix()
+    off = Rotation.from_rotvec(np.radians([0, 18, 0])).as_matrix()
     centre = found.fit.forth(known.centre[None])[0]
     shift = off @ (found.fit.shift - centre) + centre
     begun = replace(found.fit, rotation=off @ found.fit.rotation, shift=shift)
