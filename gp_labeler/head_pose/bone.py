@@ -166,7 +166,8 @@ def threshold_candidates(scan: CoarseScan) -> tuple[float, ...]:
     """Return the grey values at which bone may begin, the likeliest first.
 
     The upper cut of three classes of the square root of the grey values, and the third of four where that is
-    clearly higher: bone among tissue that is bright itself.
+    clearly higher: bone among tissue that is bright itself. Where it is not, what lies above the first cut is
+    cut again: the first one may lie between fat and muscle.
 
     Raises
     ------
@@ -183,9 +184,12 @@ def threshold_candidates(scan: CoarseScan) -> tuple[float, ...]:
     roots = np.sqrt(np.clip(values, low, high) - low)
     if len(np.unique(roots)) < 4:
         return (float(low + high) / 2,)
-    three = float(threshold_multiotsu(roots, classes=3, nbins=128)[1] ** 2)  # type: ignore[no-untyped-call]
-    four = float(threshold_multiotsu(roots, classes=4, nbins=128)[2] ** 2)  # type: ignore[no-untyped-call]
-    return (three + low, four + low) if four > _APART * three else (three + low,)
+    first = float(threshold_multiotsu(roots, classes=3, nbins=128)[1] ** 2)  # type: ignore[no-untyped-call]
+    second = float(threshold_multiotsu(roots, classes=4, nbins=128)[2] ** 2)  # type: ignore[no-untyped-call]
+    above = roots[roots**2 > first]
+    if second <= _APART * first and len(np.unique(above)) > 2:
+        second = float(threshold_multiotsu(above, classes=2, nbins=128)[0] ** 2)  # type: ignore[no-untyped-call]
+    return (first + low, second + low) if second > _APART * first else (first + low,)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,8 +39,8 @@ _WHOLE = (0.65, 0.7, 0.12)
 _PART = (0.82, 0.25, 0.05)
 """The same where much of the head is missing: agreement must be higher."""
 
-_CLEAR = (0.7, 0.45, 0.2)
-"""The same where some of it is missing, and no other plane comes near."""
+_CLEAR = (0.58, 0.6, 0.2)
+"""The same where no other plane comes near: some of the head may be missing, or bone be ragged."""
 
 _GAIN, _LATE_GAIN = 0.15, 0.04
 """By how much the fit of grey values raises agreement, overlap or margin at most, and the whole fit after the
