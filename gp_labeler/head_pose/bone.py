@@ -14,7 +14,16 @@ from gp_core.validation import FloatArray
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 
-__all__ = ["COARSER", "Bone", "CoarseScan", "bone_of", "coarse_scan", "finest_step", "threshold_candidates"]
+__all__ = [
+    "COARSER",
+    "Bone",
+    "CoarseScan",
+    "bone_of",
+    "coarse_scan",
+    "finest_step",
+    "threshold_above",
+    "threshold_candidates",
+]
 
 _Values = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
@@ -32,6 +41,10 @@ _TAILS_PERCENT = (0.5, 99.9)
 _SAMPLES = 500_000
 _APART = 1.25
 """How much farther from the dark end a second candidate of the threshold must be to be worth a try."""
+
+
+_BRIGHTER = 1.4
+"""How many times brighter bone is than soft tissue, at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,8 +179,7 @@ def threshold_candidates(scan: CoarseScan) -> tuple[float, ...]:
     """Return the grey values at which bone may begin, the likeliest first.
 
     The upper cut of three classes of the square root of the grey values, and the third of four where that is
-    clearly higher: bone among tissue that is bright itself. Where it is not, what lies above the first cut is
-    cut again: the first one may lie between fat and muscle.
+    clearly higher: bone among tissue that is bright itself.
 
     Raises
     ------
@@ -176,20 +188,38 @@ def threshold_candidates(scan: CoarseScan) -> tuple[float, ...]:
     """
     from skimage.filters import threshold_multiotsu
 
-    values = scan.grid.ravel() if scan.measured is None else scan.grid[scan.measured]
-    values = values[:: max(1, values.size // _SAMPLES)]
-    low, high = np.percentile(values, _TAILS_PERCENT) if values.size else (0.0, 0.0)
-    if not low < high:
-        raise GpError("the scan has no contrast", remedy="Check that the right series or folder was opened.")
-    roots = np.sqrt(np.clip(values, low, high) - low)
+    roots, low, high = _roots(scan)
     if len(np.unique(roots)) < 4:
         return (float(low + high) / 2,)
-    first = float(threshold_multiotsu(roots, classes=3, nbins=128)[1] ** 2)  # type: ignore[no-untyped-call]
-    second = float(threshold_multiotsu(roots, classes=4, nbins=128)[2] ** 2)  # type: ignore[no-untyped-call]
-    above = roots[roots**2 > first]
-    if second <= _APART * first and len(np.unique(above)) > 2:
-        second = float(threshold_multiotsu(above, classes=2, nbins=128)[0] ** 2)  # type: ignore[no-untyped-call]
-    return (first + low, second + low) if second > _APART * first else (first + low,)
+    three = float(threshold_multiotsu(roots, classes=3, nbins=128)[1] ** 2)  # type: ignore[no-untyped-call]
+    four = float(threshold_multiotsu(roots, classes=4, nbins=128)[2] ** 2)  # type: ignore[no-untyped-call]
+    return (three + low, four + low) if four > _APART * three else (three + low,)
+
+
+def threshold_above(scan: CoarseScan, level: float) -> float | None:
+    """Return the cut of what is brighter than a level, which may cut fat from muscle; None if there is none.
+
+    What lies above the cut must be much brighter than what lies below it.
+    """
+    from skimage.filters import threshold_otsu
+
+    roots, low, _ = _roots(scan)
+    above = roots[roots**2 > level - low]
+    if len(np.unique(above)) < 3:
+        return None
+    cut = float(threshold_otsu(above, nbins=128))  # type: ignore[no-untyped-call]
+    dark, bright = (float(np.square(part).mean()) for part in (above[above <= cut], above[above > cut]))
+    return cut**2 + low if bright > _BRIGHTER * dark else None
+
+
+def _roots(scan: CoarseScan) -> tuple[_Values, float, float]:
+    """Return square roots of grey values over the darkest, some of them, and the darkest and brightest."""
+    values = scan.grid.ravel() if scan.measured is None else scan.grid[scan.measured]
+    values = values[:: max(1, values.size // _SAMPLES)]
+    low, high = (float(v) for v in np.percentile(values, _TAILS_PERCENT)) if values.size else (0.0, 0.0)
+    if not low < high:
+        raise GpError("the scan has no contrast", remedy="Check that the right series or folder was opened.")
+    return np.sqrt(np.clip(values, low, high) - low), low, high
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from gp_labeler.head_pose.bone import (
     CoarseScan,
     coarse_scan,
     finest_step,
+    threshold_above,
     threshold_candidates,
 )
 from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values
@@ -127,7 +128,7 @@ def _mid_plane(
     fine: CoarseScan, coarse: CoarseScan, threshold: float | None, volume: Volume, report: Report
 ) -> _Found:
     """Return the first plane that can be trusted, over thresholds and islands of bone."""
-    levels = threshold_candidates(coarse) if threshold is None else (threshold,)
+    levels = _levels(coarse) if threshold is None else (threshold,)
     tried: list[_Found] = []
     problem: GpError | None = None
     for level in levels:
@@ -145,6 +146,13 @@ def _mid_plane(
     if not tried:
         raise problem or GpError("there is no bone", file=volume.path)
     raise HeadPoseError(_why(max(tried, key=lambda f: f.confidence.agreement)), file=volume.path)
+
+
+def _levels(scan: CoarseScan) -> tuple[float, ...]:
+    """Return two thresholds to try, where there are two."""
+    levels = threshold_candidates(scan)
+    further = threshold_above(scan, levels[0]) if len(levels) == 1 else None
+    return levels if further is None else (*levels, further)
 
 
 def _best_plane(bone: Bone, fine_islands: Callable[[], list[Bone]], report: Report) -> _Found:

@@ -21,7 +21,7 @@ from gp_labeler.head_pose import (
     straighten_by_landmarks,
     straighten_by_points,
 )
-from gp_labeler.head_pose.bone import bone_of, coarse_scan
+from gp_labeler.head_pose.bone import bone_of, coarse_scan, threshold_above
 from gp_labeler.head_pose.template import front_and_up
 from gp_labeler.imaging.progress import Cancelled, Report
 from gp_labeler.imaging.readers import read_volume
@@ -151,6 +151,15 @@ def test_a_sphere_is_symmetric_in_every_plane_and_refused():
     noisy = ball + np.random.default_rng(0).normal(0, 300, ball.shape)
     with pytest.raises(HeadPoseError, match="nearly as symmetric in another plane"):
         straighten(Volume(noisy.astype(np.float32), np.diag([0.5, 0.5, 0.5, 1.0])))
+
+
+def test_a_threshold_between_fat_and_muscle_is_followed_by_one_between_muscle_and_bone():
+    rng = np.random.default_rng(0)
+    parts = [(200, 50_000), (5_000, 30_000), (9_000, 30_000), (18_000, 4_000)]
+    values = np.concatenate([rng.normal(mean, 300, n) for mean, n in parts])
+    scan = coarse_scan(Volume(values.reshape(40, 50, 57).astype(np.float32), np.eye(4)), 1.0)
+    assert 9_900 < threshold_above(scan, 7_000) < 17_100
+    assert threshold_above(scan, 15_000) is None  # all of it is bone
 
 
 def test_it_stops_when_asked_and_tells_how_far_it_is():
