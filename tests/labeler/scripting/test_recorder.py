@@ -40,6 +40,9 @@ ON_BONE = MIDDLE + np.array([0.0, -BALL_MM, 0.0])
 
 DIALOG = "a dialog: what it does is written once it is done"
 CHOOSES = "chooses only: an edit is written with its point"
+KEEPS_VIEWS = ("view.canvas", "view.next_view", "view.step_")
+"""Commands of the menu View, or beginnings of their names, that change nothing of what the views show."""
+
 ACTION_STEPS = {
     **dict.fromkeys(("file.open", "file.open_folder", "file.demo", "file.find_scan", "file.new"), "open"),
     **dict.fromkeys(("file.save", "file.save_as"), "save"),
@@ -54,7 +57,7 @@ ACTION_STEPS = {
     "edit.redo": "action",
     "edit.swap": "swap_points",
     "edit.swap_sides": "swap_sides",
-    **{id: "view" for id in ACTIONS if id.startswith("view.") and id != "view.canvas"},
+    **{id: "view" for id in ACTIONS if id.startswith("view.") and not id.startswith(KEEPS_VIEWS)},
     **{id: "action" for id in ACTIONS if id.startswith(("view.from_", "view.cut_", "tool."))},
     **dict.fromkeys(("view.cut_open",), "action"),
     **dict.fromkeys(("view.reset", "view.zoom_to_point", "view.projection", "view.slices_visible"), "action"),
