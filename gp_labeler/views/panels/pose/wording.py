@@ -149,7 +149,10 @@ def _difference(check: EarCheck, apart: str) -> str:
 def _ear_remedy(check: EarCheck) -> str:
     if check.suspects:
         return f"Touch {check.suspects[0]} again on both ears."
-    return "Check sides and names, and that head and reference did not move between the ears."
+    return (
+        "Check sides and names. If head and reference moved between the ears, clear the touches of the other "
+        "ear."
+    )
 
 
 def likely_text(probability: float) -> str:
