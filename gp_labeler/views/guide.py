@@ -22,6 +22,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels, styled, text_scale
 from gp_labeler.views.formatting import degrees_text
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import scrolled, text_label
 from gp_labeler.views.panels.pose.wording import sentence
@@ -221,9 +222,7 @@ class GuideWindow(QWidget):
     def _lay_out(self) -> None:
         content = QWidget()
         content.setProperty("role", "panel")
-        around = QVBoxLayout(self)
-        around.setContentsMargins(0, 0, 0, 0)
-        around.addWidget(scrolled(content))
+        in_column(scrolled(content), margins=0, of=self)
         whole = QVBoxLayout(content)
         whole.setContentsMargins(32, 24, 32, 24)
         whole.setSpacing(16)
@@ -231,16 +230,8 @@ class GuideWindow(QWidget):
         head.setStretchFactor(self.state, 1)
         self.state.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         whole.addLayout(head)
-        middle = QHBoxLayout()
-        middle.setSpacing(32)
-        middle.addWidget(self.picture, 5)
-        words = QVBoxLayout()
-        words.setSpacing(12)
-        for label in (self.code, self.name, self.definition):
-            words.addWidget(label)
-        words.addStretch(1)
-        words.addWidget(self.told)
-        words.addWidget(self.caption)
+        middle = in_row(wide(self.picture, 5), spacing=32)
+        words = in_column(self.code, self.name, self.definition, STRETCH, self.told, self.caption, spacing=12)
         estimate = FlowLayout(spacing=16)
         for label in (self.result, self.trust):
             estimate.addWidget(label)
@@ -276,11 +267,7 @@ def _big(words: str, hint: str, call: Callable[[], object]) -> QPushButton:
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:
-    row = QHBoxLayout()
-    row.setSpacing(16)
-    for widget in widgets:
-        row.addWidget(widget)
-    return row
+    return in_row(*widgets, spacing=16)
 
 
 def _progress(touched: Collection[str]) -> str:

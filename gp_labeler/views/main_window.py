@@ -12,12 +12,9 @@ from qtpy.QtCore import QByteArray, QEvent, QSize, Qt
 from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeyEvent, QResizeEvent
 from qtpy.QtWidgets import (
     QApplication,
-    QBoxLayout,
-    QHBoxLayout,
     QLineEdit,
     QMainWindow,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -34,6 +31,7 @@ from gp_labeler.models.view import ViewState
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.fonts import desktop_scale, nearest_text_size
+from gp_labeler.views.layouts import in_column, in_row, wide
 from gp_labeler.views.memory_return import MemoryReturn
 from gp_labeler.views.painting.measure_layer import MeasureLayer
 from gp_labeler.views.painting.reference_layer import ReferenceLayer
@@ -62,7 +60,6 @@ from gp_labeler.views.window_state import WindowState
 
 __all__ = ["MainWindow"]
 
-Layout = TypeVar("Layout", bound=QBoxLayout)
 Panel = TypeVar("Panel", bound=QWidget)
 
 _ALONE = MappingProxyType(
@@ -182,19 +179,12 @@ class MainWindow(QMainWindow):
         for panel in self.steps.values():
             self.panels.addWidget(panel)
         work = QWidget()
-        middle = _tight(QHBoxLayout(work), spacing=_GAP)
-        middle.addWidget(self.grid, 1)
-        middle.addWidget(self.panels)
+        in_row(wide(self.grid), self.panels, margins=0, spacing=_GAP, of=work)
         self.pages.addWidget(self.welcome)
         self.pages.addWidget(work)
-        sides = _tight(QHBoxLayout(), spacing=_GAP)
-        sides.addWidget(self.rail)
-        sides.addWidget(self.pages, 1)
-        centre = QWidget()
-        whole = _tight(QVBoxLayout(centre))
-        whole.addWidget(TopBar(self.workspace, self.commands.actions))
-        whole.addLayout(sides, 1)
-        whole.addWidget(self.status)
+        centre, bar = QWidget(), TopBar(self.workspace, self.commands.actions)
+        sides = in_row(self.rail, wide(self.pages), margins=0, spacing=_GAP)
+        in_column(bar, wide(sides), self.status, margins=0, spacing=0, of=centre)
         self.setCentralWidget(centre)
         self._show_page()
 
@@ -369,9 +359,3 @@ class MainWindow(QMainWindow):
             self.take_touches(paths[0])
         else:
             self.open_path(paths[0])
-
-
-def _tight(layout: Layout, *, spacing: int = 0) -> Layout:
-    layout.setContentsMargins(0, 0, 0, 0)
-    layout.setSpacing(spacing)
-    return layout

@@ -7,7 +7,6 @@ from qtpy.QtGui import QKeySequence
 from qtpy.QtWidgets import (
     QDialog,
     QGridLayout,
-    QHBoxLayout,
     QLabel,
     QPushButton,
     QVBoxLayout,
@@ -16,6 +15,7 @@ from qtpy.QtWidgets import (
 
 from gp_labeler.commands.actions import ACTIONS, MENUS, gestures
 from gp_labeler.views.fonts import fit, text_width
+from gp_labeler.views.layouts import STRETCH, in_column, in_row
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import open_at, scrolled
 
@@ -59,14 +59,11 @@ class ShortcutsSheet(QDialog):
         close = QPushButton("Close")
         close.setProperty("role", "primary")
         close.clicked.connect(self.accept)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 8, 0, 12)
-        whole.addWidget(scrolled(sheet, page="Keys and mouse gestures"))
-        row = QHBoxLayout()
-        row.setContentsMargins(20, 0, 20, 0)
-        row.addStretch(1)
-        row.addWidget(close)
-        whole.addLayout(row)
+        keys, foot = (
+            scrolled(sheet, page="Keys and mouse gestures"),
+            in_row(STRETCH, close, margins=(20, 0, 20, 0)),
+        )
+        in_column(keys, foot, margins=(0, 8, 0, 12), of=self)
         open_at(self, 0, 760)
         hint = sheet.sizeHint()
         self.resize(min(hint.width() + 40, self.screen().availableSize().width()), self.height())

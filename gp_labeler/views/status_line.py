@@ -18,6 +18,7 @@ from gp_labeler.views.announcing import announce
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
 from gp_labeler.views.formatting import capitalised
 from gp_labeler.views.icons import icon
+from gp_labeler.views.layouts import in_row, wide
 from gp_labeler.views.panels.parts import breakable
 from gp_labeler.views.signals import follow
 from gp_labeler.views.theme import theme_of
@@ -65,13 +66,15 @@ class StatusLine(QWidget):
         self.next_click.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.work = _Work(workspace)
         self.work.changed.connect(self._make_room)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(_MARGIN, 0, _MARGIN, 0)
-        row.setSpacing(_MARGIN)
-        row.addWidget(self.frame)
-        row.addWidget(self.where)
-        row.addWidget(self.next_click, 1)
-        row.addWidget(self.work)
+        in_row(
+            self.frame,
+            self.where,
+            wide(self.next_click),
+            self.work,
+            margins=(_MARGIN, 0, _MARGIN, 0),
+            spacing=_MARGIN,
+            of=self,
+        )
         self.without_scan = ""
         self._message_timer = QTimer(self, singleShot=True)
         self._message_timer.timeout.connect(self._say_next)

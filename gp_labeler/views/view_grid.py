@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from qtpy.QtCore import QEvent, QSize, Qt, Signal
 from qtpy.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSplitter, QToolButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QLabel, QSizePolicy, QSplitter, QToolButton, QWidget
 
 from gp_core.landmarks.features import feature
 from gp_core.validation import FloatArray
@@ -14,6 +14,7 @@ from gp_labeler.views.filter_words import filter_hint, filter_words
 from gp_labeler.views.fonts import HEADING, fit, line_height, pixels, text_width
 from gp_labeler.views.formatting import number_text, value_text
 from gp_labeler.views.icons import icon
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.scene_view import SceneView
 from gp_labeler.views.signals import follow
 from gp_labeler.views.slice_slider import SliceSlider
@@ -60,14 +61,9 @@ class ViewHeader(QWidget):
         self._button.setToolTip("Maximise or restore this view (double click)")
         self._button.setAccessibleName(f"Maximise the {name} view")
         self._button.clicked.connect(self.maximise_asked)
-        self._row = QHBoxLayout(self)
-        self._row.setContentsMargins(10, 0, 2, 0)
-        self._row.setSpacing(8)
-        self._row.addWidget(title)
-        self._row.addWidget(self.where)
-        self._row.addWidget(self.filters)
-        self._row.addStretch(1)
-        self._row.addWidget(self._button)
+        self._row = in_row(
+            title, self.where, self.filters, STRETCH, self._button, margins=(10, 0, 2, 0), spacing=8, of=self
+        )
         self._slider: SliceSlider | None = None
         fit(self, self._fit)
         self.take_theme()
@@ -163,11 +159,7 @@ class ViewFrame(QWidget):
         super().__init__()
         self.name, self.view = name, view
         self.header = ViewHeader(name)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.header)
-        column.addWidget(view, 1)
+        in_column(self.header, wide(view), margins=0, spacing=0, of=self)
         if isinstance(view, SliceView):
             self.header.add(SliceSlider(view))
         self.header.maximise_asked.connect(self._ask)
@@ -201,9 +193,7 @@ class ViewGrid(QWidget):
         for row in self._rows:
             self._column.addWidget(row)
         self._column.setSizes([1000, 1000])
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(self._column)
+        in_column(self._column, margins=0, of=self)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Expanding)
         self._narrow = False
         self._beside, self._several = "axial", "four-up"

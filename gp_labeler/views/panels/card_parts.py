@@ -18,6 +18,7 @@ from qtpy.QtWidgets import (
 
 from gp_labeler.views.chips import chip_pixmap
 from gp_labeler.views.fonts import TEXT, fit, pixels, styled
+from gp_labeler.views.layouts import in_row
 from gp_labeler.views.panels.parts import Notice, emptied, text_label
 from gp_labeler.views.signals import blocked
 from gp_labeler.views.theme import theme_of
@@ -101,11 +102,7 @@ class QualityBadge(QWidget):
         super().__init__(parent)
         self._chip, self.label = QLabel(), text_label("", "heading")
         self._level = ""
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        row.addWidget(self._chip)
-        row.addWidget(self.label)
+        in_row(self._chip, self.label, margins=0, spacing=6, of=self)
         fit(self, self._fit)
 
     def _fit(self) -> None:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtGui import QMouseEvent
-from qtpy.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
+from gp_labeler.views.layouts import in_row, wide
 from gp_labeler.views.panels.parts import Notice, emptied
 
 __all__ = ["FindingList", "FindingRow"]
@@ -83,10 +84,7 @@ class _ClickableNotice(QWidget):
     def __init__(self, row: FindingRow, open_target: object) -> None:
         super().__init__()
         self._row, self._open = row, open_target
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(6)
-        layout.addWidget(Notice(row.level, row.words, row.remedy), 1)
+        layout = in_row(wide(Notice(row.level, row.words, row.remedy)), margins=0, spacing=6, of=self)
         if row.target is not None:
             self.setCursor(Qt.CursorShape.PointingHandCursor)
             show = QPushButton("Show")

@@ -22,6 +22,7 @@ from qtpy.QtWidgets import (
 from gp_labeler.views.fonts import elided, fit, line_height, pixels, text_width
 from gp_labeler.views.formatting import capitalised
 from gp_labeler.views.icons import icon_pixmap
+from gp_labeler.views.layouts import in_column, in_row, placed
 from gp_labeler.views.theme import theme_of
 
 __all__ = [
@@ -346,13 +347,10 @@ class Notice(QWidget):
         super().__init__(parent)
         name, colour = _LOOKS[level]
         self.level, self.words = level, words
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(8)
-        row.addWidget(IconLabel(name, colour, 16), 0, Qt.AlignmentFlag.AlignTop)
-        column = QVBoxLayout()
-        column.setSpacing(1)
-        column.addWidget(text_label(breakable(capitalised(words)), wrap=True))
+        row = in_row(
+            placed(IconLabel(name, colour, 16), Qt.AlignmentFlag.AlignTop), margins=0, spacing=8, of=self
+        )
+        column = in_column(text_label(breakable(capitalised(words)), wrap=True), spacing=1)
         if remedy:
             column.addWidget(text_label(breakable(remedy), "hint", wrap=True))
         row.addLayout(column, 1)

@@ -13,6 +13,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
 from gp_labeler.views.icons import draw_icon
+from gp_labeler.views.layouts import in_column
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.signals import follow
 from gp_labeler.views.theme import theme_of
@@ -80,10 +81,7 @@ class Rail(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 8, 0, 8)
         layout.setSpacing(4)
-        self._steps = QVBoxLayout()
-        self._steps.setSpacing(4)
-        for button in self.buttons.values():
-            self._steps.addWidget(button)
+        self._steps = in_column(*self.buttons.values(), spacing=4)
         layout.addLayout(self._steps)
         layout.addStretch(1)
         layout.addWidget(self.keys_button)

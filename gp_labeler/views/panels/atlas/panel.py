@@ -24,6 +24,7 @@ from gp_labeler.jobs.atlas import FEWEST_ANIMALS, FitAtlas
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.atlas.feature_table import FeatureTable
 from gp_labeler.views.panels.atlas.repeatability_card import RepeatabilityCard
@@ -111,12 +112,7 @@ class AtlasPanel(QWidget):
 
 
 def _column(*cards: QWidget) -> QVBoxLayout:
-    column = QVBoxLayout()
-    column.setSpacing(6)
-    for card in cards:
-        column.addWidget(card)
-    column.addStretch(1)
-    return column
+    return in_column(*cards, STRETCH, spacing=6)
 
 
 class AtlasCard(Card):
@@ -257,11 +253,13 @@ class AtlasFittingCard(Card):
         fit(self.progress, lambda: self.progress.setFixedHeight(pixels(self, 8)))
         self.stop.clicked.connect(self._stop)
         self._work = QWidget()
-        line = QHBoxLayout(self._work)
-        line.setContentsMargins(0, 0, 0, 0)
-        line.addWidget(text_label("Reading and checking", "hint"))
-        line.addWidget(self.progress, 1)
-        line.addWidget(self.stop)
+        in_row(
+            text_label("Reading and checking", "hint"),
+            wide(self.progress),
+            self.stop,
+            margins=0,
+            of=self._work,
+        )
         self._work.hide()
         self.add(self._work)
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from qtpy.QtWidgets import QHBoxLayout, QLineEdit, QToolButton, QWidget
+from qtpy.QtWidgets import QLineEdit, QToolButton, QWidget
 
 from gp_core.landmarks.provenance import Certainty
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import in_row, wide
 from gp_labeler.views.panels.label.certainty import CERTAINTY_HINTS
 from gp_labeler.views.signals import attempt, blocked
 
@@ -32,12 +33,7 @@ class AnnotationRow(QWidget):
             "What you saw there, such as a broken bulla, fluid or an artefact; stored with the label"
         )
         self.note.editingFinished.connect(self._keep_note)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(4)
-        for button in self.buttons.values():
-            row.addWidget(button)
-        row.addWidget(self.note, 1)
+        in_row(*self.buttons.values(), wide(self.note), margins=0, spacing=4, of=self)
 
     def refresh(self) -> None:
         """Show what is known of the active point; hidden while there is nothing to annotate."""

@@ -11,7 +11,6 @@ from qtpy.QtWidgets import (
     QCheckBox,
     QDialog,
     QFileDialog,
-    QHBoxLayout,
     QLineEdit,
     QPushButton,
     QVBoxLayout,
@@ -24,6 +23,7 @@ from gp_core.landmarks.sets import Status
 from gp_labeler.document.landmark_export import CO_IS_COMPUTED, FORMATS, export_landmarks, export_names
 from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import in_column, in_row, wide
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
     Notice,
@@ -125,17 +125,16 @@ class ExportDialog(QDialog):
     def _lay_out(self) -> None:
         content = QWidget()
         content.setProperty("role", "panel")
-        self._form = QVBoxLayout(content)
-        self._form.setContentsMargins(20, 16, 20, 12)
-        self._form.setSpacing(8)
-        self._form.addWidget(ElidedLabel(f"Landmarks of {self._workspace.document.state.specimen}", "title"))
-        self._form.addLayout(self._findings)
+        self._form = in_column(
+            ElidedLabel(f"Landmarks of {self._workspace.document.state.specimen}", "title"),
+            self._findings,
+            margins=(20, 16, 20, 12),
+            spacing=8,
+            of=content,
+        )
         self._form.addSpacing(4)
         self._form.addWidget(text_label("Folder", "heading"))
-        row = QHBoxLayout()
-        row.addWidget(self.folder, 1)
-        row.addWidget(self.browse)
-        self._form.addLayout(row)
+        self._form.addLayout(in_row(wide(self.folder), self.browse))
         self._form.addWidget(text_label("Formats", "heading"))
         for box in self.formats.values():
             self._form.addWidget(box)
@@ -144,15 +143,12 @@ class ExportDialog(QDialog):
         self._form.addWidget(self.files)
         self._form.addWidget(self.replace)
         self._form.addStretch(1)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(20, 10, 20, 14)
-        foot.addWidget(self._result, 1)
-        foot.addWidget(self.cancel)
-        foot.addWidget(self.export)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolled(content), 1)
-        layout.addLayout(foot)
+        in_column(
+            wide(scrolled(content)),
+            in_row(wide(self._result), self.cancel, self.export, margins=(20, 10, 20, 14)),
+            margins=0,
+            of=self,
+        )
 
     def _missing(self) -> list[tuple[str, str]]:
         """Return a finding for each side, with its level."""

@@ -8,7 +8,6 @@ from qtpy.QtCore import QEvent, Qt
 from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import (
     QBoxLayout,
-    QHBoxLayout,
     QLabel,
     QPushButton,
     QSizePolicy,
@@ -25,6 +24,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, placed, wide
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.card_parts import link
 from gp_labeler.views.panels.flow import FlowLayout
@@ -151,31 +151,21 @@ class FeatureCard(QWidget):
         return button
 
     def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.addWidget(self._eyebrow, 1)
-        top.setSpacing(4)
-        top.addWidget(self.cut_open)
-        for button in self.sides.values():
-            top.addWidget(button)
-        status = QHBoxLayout()
-        status.setSpacing(6)
-        status.addWidget(self._chip, 0, Qt.AlignmentFlag.AlignTop)
-        status.addWidget(self._status, 1)
-        words = QVBoxLayout()
-        words.setSpacing(4)
-        for label in (self._definition, self._where, self._mistakes):
-            words.addWidget(label)
-        words.addWidget(self.plane, 0, Qt.AlignmentFlag.AlignLeft)
-        words.addStretch(1)
+        top = in_row(wide(self._eyebrow), self.cut_open, *self.sides.values(), spacing=4)
+        status = in_row(placed(self._chip, Qt.AlignmentFlag.AlignTop), wide(self._status), spacing=6)
+        words = in_column(
+            self._definition,
+            self._where,
+            self._mistakes,
+            placed(self.plane, Qt.AlignmentFlag.AlignLeft),
+            STRETCH,
+            spacing=4,
+        )
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(10)
         self._body.addWidget(self.picture, 2)
         self._body.addLayout(words, 3)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(6)
-        buttons.addWidget(self.primary, 1)
-        buttons.addWidget(self.skip)
-        buttons.addWidget(self.unseen)
+        buttons = in_row(wide(self.primary), self.skip, self.unseen, spacing=6)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(12, 8, 12, 12)
         layout.setSpacing(5)

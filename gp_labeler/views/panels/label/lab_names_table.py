@@ -8,15 +8,14 @@ from qtpy.QtCore import Signal
 from qtpy.QtWidgets import (
     QComboBox,
     QGridLayout,
-    QHBoxLayout,
     QPushButton,
     QSizePolicy,
-    QVBoxLayout,
     QWidget,
 )
 
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.labels import LabelNames, parse_label
+from gp_labeler.views.layouts import STRETCH, in_column, in_row
 from gp_labeler.views.panels.parts import ElidedLabel, emptied, text_label
 from gp_labeler.views.signals import blocked
 
@@ -52,15 +51,13 @@ class LabNamesTable(QWidget):
             self._rows.setColumnStretch(number, share)
         self._rows.setHorizontalSpacing(12)
         self._rows.setVerticalSpacing(6)
-        foot = QHBoxLayout()
-        foot.addWidget(self.leave_rest)
-        foot.addWidget(self.load)
-        foot.addStretch(1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(text_label("What do these names stand for?", "hint"))
-        column.addLayout(self._rows)
-        column.addLayout(foot)
+        in_column(
+            text_label("What do these names stand for?", "hint"),
+            self._rows,
+            in_row(self.leave_rest, self.load, STRETCH),
+            margins=0,
+            of=self,
+        )
         self.show_names(())
 
     @property

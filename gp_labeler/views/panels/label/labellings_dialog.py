@@ -5,13 +5,11 @@ from __future__ import annotations
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import (
     QDialog,
-    QHBoxLayout,
     QHeaderView,
     QLineEdit,
     QPushButton,
     QTableWidget,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -19,6 +17,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.labelling_edits import labelling_text, next_round
 from gp_labeler.models.labellings import LabellingRow, labelling_rows
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.parts import open_at, text_label
 from gp_labeler.views.signals import attempt, follow
 from gp_labeler.views.times import time_text
@@ -93,21 +92,15 @@ class LabellingsDialog(QDialog):
         self._refresh_buttons()
 
     def _lay_out(self) -> None:
-        who = QHBoxLayout()
-        who.addWidget(text_label("You are", "heading"))
-        who.addWidget(self.observer, 1)
-        foot = QHBoxLayout()
-        foot.addWidget(self.open_chosen)
-        foot.addStretch(1)
-        foot.addWidget(self.close_button)
-        foot.addWidget(self.again)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(20, 16, 20, 14)
-        layout.setSpacing(10)
-        layout.addWidget(text_label(_HINT, "hint", wrap=True))
-        layout.addWidget(self.table, 1)
-        layout.addLayout(who)
-        layout.addLayout(foot)
+        in_column(
+            text_label(_HINT, "hint", wrap=True),
+            wide(self.table),
+            in_row(text_label("You are", "heading"), wide(self.observer)),
+            in_row(self.open_chosen, STRETCH, self.close_button, self.again),
+            margins=(20, 16, 20, 14),
+            spacing=10,
+            of=self,
+        )
 
     def _refresh_buttons(self, *_: object) -> None:
         name, state = self.observer.text().strip(), self._workspace.document.state

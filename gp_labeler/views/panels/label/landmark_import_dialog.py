@@ -11,7 +11,6 @@ from qtpy.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDialog,
-    QHBoxLayout,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -25,6 +24,7 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.document.lab_names import LabNamesMemory
 from gp_labeler.document.landmark_import import OffBoneError, Predicate, import_landmarks
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, placed, wide
 from gp_labeler.views.panels.label.lab_names_table import LabNamesTable
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
 from gp_labeler.views.prompts import Prompts
@@ -101,34 +101,29 @@ class LandmarkImportDialog(QDialog):
     def _lay_out(self) -> None:
         content = QWidget()
         content.setProperty("role", "panel")
-        column = QVBoxLayout(content)
-        column.setContentsMargins(20, 16, 20, 12)
-        column.setSpacing(10)
-        column.addWidget(self._title)
-        column.addLayout(self._findings)
-        column.addWidget(self.show_only, 0, Qt.AlignmentFlag.AlignLeft)
-        column.addWidget(self.names)
-        column.addWidget(self.anyway)
+        column = in_column(
+            self._title,
+            self._findings,
+            placed(self.show_only, Qt.AlignmentFlag.AlignLeft),
+            self.names,
+            self.anyway,
+            margins=(20, 16, 20, 12),
+            spacing=10,
+            of=content,
+        )
         self._choices = QWidget()
         choices = QVBoxLayout(self._choices)
         choices.setContentsMargins(0, 4, 0, 0)
-        row = QHBoxLayout()
-        row.addWidget(text_label("Side", "hint"))
-        row.addWidget(self.side)
-        row.addStretch(1)
-        choices.addLayout(row)
+        choices.addLayout(in_row(text_label("Side", "hint"), self.side, STRETCH))
         choices.addWidget(self.keep)
         column.addWidget(self._choices)
         column.addStretch(1)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(20, 10, 20, 14)
-        foot.addStretch(1)
-        foot.addWidget(self.cancel)
-        foot.addWidget(self.take)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolled(content), 1)
-        layout.addLayout(foot)
+        in_column(
+            wide(scrolled(content)),
+            in_row(STRETCH, self.cancel, self.take, margins=(20, 10, 20, 14)),
+            margins=0,
+            of=self,
+        )
 
     def _look(self, *_: object) -> None:
         """Read the files, and say what is in them."""

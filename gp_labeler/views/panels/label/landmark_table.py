@@ -10,7 +10,6 @@ from qtpy.QtWidgets import (
     QStyledItemDelegate,
     QStyleOptionViewItem,
     QTableView,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -20,6 +19,7 @@ from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
+from gp_labeler.views.layouts import in_column
 from gp_labeler.views.panels.label.landmark_menu import landmark_menu
 from gp_labeler.views.panels.label.landmark_table_model import (
     ACTIVE_ROLE,
@@ -59,9 +59,7 @@ class LandmarkTable(QWidget):
         self._workspace = workspace
         self.model = LandmarkTableModel(workspace, self)
         self.view = _TableView(self.model, self)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.view)
+        in_column(self.view, margins=0, of=self)
         fit(self, lambda: self.setMaximumHeight(self.view.height_of(len(CODES), roomy=True)))
         self.view.selectionModel().currentChanged.connect(self._on_current)
         self.view.clicked.connect(self._on_clicked)

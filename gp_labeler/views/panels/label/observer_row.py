@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from gp_labeler.document.labelling_edits import labelling_text
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import in_column, in_row, wide
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.parts import ElidedLabel, text_label
 from gp_labeler.views.signals import attempt, follow
@@ -40,10 +41,7 @@ class ObserverRow(QWidget):
         self.keep.setToolTip("Stored on this computer; the name of your account is never used")
         self.keep.clicked.connect(self._keep)
         self._asked = QWidget()
-        line = QHBoxLayout()
-        line.setSpacing(6)
-        line.addWidget(self.name, 1)
-        line.addWidget(self.keep)
+        line = in_row(wide(self.name), self.keep, spacing=6)
         question = QVBoxLayout(self._asked)
         question.setContentsMargins(12, 4, 12, 0)
         question.setSpacing(4)
@@ -55,14 +53,8 @@ class ObserverRow(QWidget):
             actions["labelling.show"], "Labellings…", "Label again (blind), other observers and rounds"
         )
         self._told = QWidget()
-        told = QHBoxLayout(self._told)
-        told.setContentsMargins(12, 0, 12, 0)
-        told.addWidget(self.words, 1)
-        told.addWidget(self.labellings)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._asked)
-        layout.addWidget(self._told)
+        in_row(wide(self.words), self.labellings, margins=(12, 0, 12, 0), of=self._told)
+        in_column(self._asked, self._told, margins=0, of=self)
         document = workspace.document
         for signal in (document.reset, document.author_changed, document.labelling_changed):
             follow(self, signal, self.refresh)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from qtpy.QtCore import Qt
-from qtpy.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.layouts import in_column, in_row, placed, wide
 from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.label.feature_card import FeatureCard
 from gp_labeler.views.panels.label.landmark_table import LandmarkTable
@@ -47,18 +48,14 @@ class LabelPanel(QWidget):
         column.setContentsMargins(4, 8, 8, 8)
         column.setSpacing(6)
         fit(self, lambda: self.card.setMaximumHeight(pixels(self, _TALLEST_CARD)))
-        head = QHBoxLayout()
-        head.setSpacing(0)
-        head.addWidget(self.observer, 1)
-        head.addWidget(self.suggest, 0, Qt.AlignmentFlag.AlignBottom)
-        column.addLayout(head)
+        column.addLayout(
+            in_row(wide(self.observer), placed(self.suggest, Qt.AlignmentFlag.AlignBottom), spacing=0)
+        )
         column.addWidget(self.left)
         column.addWidget(self.card, 1)
         column.addWidget(self.table, 2)
         column.addStretch(0)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(Scrolled(content))
+        in_column(Scrolled(content), margins=0, of=self)
         self.setFocusProxy(self.table.view)
         self.observer.named.connect(self._leave_text)
         self.card.annotation.note.returnPressed.connect(self._leave_text)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from qtpy.QtWidgets import QHBoxLayout, QWidget
+from qtpy.QtWidgets import QWidget
 
 from gp_core.landmarks.features import Side
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import in_row
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.signals import follow
 
@@ -33,9 +34,7 @@ class SuggestRow(QWidget):
             _OFFER,
             "Suggests first labels from labelled scans; click again to stop",
         )
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 12, 0)
-        row.addWidget(self.button)
+        in_row(self.button, margins=(0, 0, 12, 0), of=self)
         document = workspace.document
         for signal in (document.reset, document.landmarks_changed, workspace.first_labels.changed):
             follow(self, signal, self.refresh)

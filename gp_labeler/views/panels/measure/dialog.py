@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from qtpy.QtCore import Qt
-from qtpy.QtWidgets import QComboBox, QDialog, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QComboBox, QDialog, QPushButton, QWidget
 
 from gp_core.landmarks.features import Side
 from gp_core.study.distance_check import DISAGREES_SD, PairDistance
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.finding_list import FindingList, FindingRow
 from gp_labeler.views.panels.flow import FlowLayout
@@ -106,22 +107,13 @@ class MeasureDialog(QDialog):
         self.distances.pair_chosen.connect(self._open)
         content = QWidget()
         content.setProperty("role", "panel")
-        column = QVBoxLayout(content)
-        column.setContentsMargins(12, 12, 12, 12)
-        column.setSpacing(8)
-        column.addWidget(rulers)
-        column.addWidget(distances, 1)
+        in_column(rulers, wide(distances), margins=(12, 12, 12, 12), spacing=8, of=content)
         close = QPushButton("Close")
         close.setAutoDefault(False)
         close.clicked.connect(self.accept)
-        row = QHBoxLayout()
-        row.setContentsMargins(12, 4, 12, 10)
-        row.addStretch(1)
-        row.addWidget(close)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(scrolled(content), 1)
-        whole.addLayout(row)
+        in_column(
+            wide(scrolled(content)), in_row(STRETCH, close, margins=(12, 4, 12, 10)), margins=0, of=self
+        )
 
     def done(self, code: int) -> None:
         """Close, and draw no distance between landmarks any more."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from qtpy.QtCore import Qt
-from qtpy.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QSlider, QWidget
+from qtpy.QtWidgets import QCheckBox, QGridLayout, QSlider, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, text_width
+from gp_labeler.views.layouts import in_row, wide
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import link
 from gp_labeler.views.panels.flow import FlowLayout
@@ -80,11 +81,7 @@ class OverlayCard(Card):
         for n, box in enumerate(self.parts.values()):
             grid.addWidget(box, n // 2, n % 2)
         self.add(grid)
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(text_label("Opacity", "hint"))
-        row.addWidget(self.opacity, 1)
-        row.addWidget(self.percent)
+        row = in_row(text_label("Opacity", "hint"), wide(self.opacity), self.percent, spacing=8)
         fit(self.percent, lambda: self.percent.setFixedWidth(text_width(self.percent, "100 %")))
         self.add(row)
         looks = FlowLayout(spacing=2)

@@ -13,10 +13,11 @@ from qtpy.QtGui import (
     QResizeEvent,
     QShowEvent,
 )
-from qtpy.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.layouts import in_row, placed, wide
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.parts import Card, lay_out_hidden, scrolled
 from gp_labeler.views.panels.pose.overlay_card import OverlayCard
@@ -100,11 +101,7 @@ class PosePanel(QWidget):
     def _lay_out(self) -> None:
         self.left, self.right = QVBoxLayout(), QVBoxLayout()
         out = Card("Export")
-        row = QHBoxLayout()
-        row.setSpacing(6)
-        row.addWidget(self.report, 1)
-        row.addWidget(self.export, 1)
-        out.add(row)
+        out.add(in_row(wide(self.report), wide(self.export), spacing=6))
         for column, cards in (
             (self.left, (self.head, self.touches)),
             (self.right, (self.result, self.in_scan, self.overlay, self.verdict, out)),
@@ -123,9 +120,7 @@ class PosePanel(QWidget):
         self.right.addStretch(1)
         content = QWidget()
         content.setProperty("role", "panel")
-        middle = QHBoxLayout(content)
-        middle.setContentsMargins(0, 0, 0, 0)
-        middle.addWidget(body, 0, Qt.AlignmentFlag.AlignTop)
+        in_row(placed(body, Qt.AlignmentFlag.AlignTop), margins=0, of=content)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         self._area = scrolled(content)

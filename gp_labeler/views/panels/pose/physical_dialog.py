@@ -10,7 +10,6 @@ from qtpy.QtGui import QPixmap
 from qtpy.QtWidgets import (
     QDialog,
     QGridLayout,
-    QHBoxLayout,
     QLabel,
     QProgressBar,
     QPushButton,
@@ -23,6 +22,7 @@ from gp_core.disk import write_bytes, write_text
 from gp_labeler.jobs.physical import PhysicalResult, PhysicalTest
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, open_at, scrolled, text_label
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.signals import attempt
@@ -143,27 +143,22 @@ class PhysicalDialog(QDialog):
             button.clicked.connect(call)
         close = QPushButton("Close")
         close.clicked.connect(self.accept)
-        buttons = QHBoxLayout()
-        for widget in (self.save_figure, self.save_json):
-            buttons.addWidget(widget)
-        buttons.addStretch(1)
-        buttons.addWidget(close)
+        buttons = in_row(self.save_figure, self.save_json, STRETCH, close)
         content = QWidget()
         content.setProperty("role", "panel")
-        column = QVBoxLayout(content)
-        column.setContentsMargins(20, 16, 20, 8)
-        column.setSpacing(10)
-        column.addWidget(self.title)
-        column.addWidget(self.busy)
-        column.addLayout(self.rows)
-        column.addLayout(self.findings)
-        column.addWidget(self.figure)
-        column.addStretch(1)
+        in_column(
+            self.title,
+            self.busy,
+            self.rows,
+            self.findings,
+            self.figure,
+            STRETCH,
+            margins=(20, 16, 20, 8),
+            spacing=10,
+            of=content,
+        )
         buttons.setContentsMargins(20, 4, 20, 14)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolled(content), 1)
-        layout.addLayout(buttons)
+        in_column(wide(scrolled(content)), buttons, margins=0, of=self)
 
 
 def _write(path: Path, result: PhysicalResult | None) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from qtpy.QtCore import Qt
-from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+from qtpy.QtWidgets import QGridLayout, QWidget
 
 from gp_core.constants import METHOD_NAMES
 from gp_labeler.document import touching
@@ -14,6 +14,7 @@ from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import HEADING, styled
 from gp_labeler.views.formatting import NONE, position_text
+from gp_labeler.views.layouts import in_row, wide
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Notices, Segments, link, numbers
 from gp_labeler.views.panels.parts import Card, text_label
@@ -116,12 +117,7 @@ class RegistrationCard(Card):
             grid.addWidget(label, row, 1)
         self.add(self._table)
         self.add(self.notices)
-        row_of_skull = QHBoxLayout()
-        row_of_skull.setSpacing(2)
-        row_of_skull.addWidget(self.skull, 1)
-        row_of_skull.addWidget(self.file)
-        row_of_skull.addWidget(self.mark)
-        self.add(row_of_skull)
+        self.add(in_row(wide(self.skull), self.file, self.mark, spacing=2))
 
     def _show_skull(self) -> None:
         n = len(self._workspace.document.state.skull)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QLineEdit, QWidget
+from qtpy.QtWidgets import QCheckBox, QLabel, QLineEdit, QWidget
 
 from gp_core.constants import METHOD_NAMES
 from gp_core.landmarks.features import Side
 from gp_labeler.document.specimen_edits import RenameSpecimen
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, text_width
+from gp_labeler.views.layouts import STRETCH, in_row, wide
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Segments, link
 from gp_labeler.views.panels.number_field import NumberField
@@ -128,42 +129,22 @@ class EstimateSettingsCard(Card):
 
     def _lay_out(self) -> None:
         self.heading.hide()
-        choices = QHBoxLayout()
-        choices.setSpacing(12)
-        choices.addWidget(self.side, 2)
-        choices.addWidget(self.method, 3)
-        self._named = QWidget()
-        self._in_plane = QWidget()
-        name, in_plane = QHBoxLayout(self._named), QHBoxLayout(self._in_plane)
-        noise, shared, each, atlas = (QHBoxLayout() for _ in range(4))
-        for row in (name, in_plane):
-            row.setContentsMargins(0, 0, 0, 0)
-        for row, caption, fields in (
-            (name, "Specimen", (self.specimen, self.new)),
-            (noise, _NOISE, (self.noise, self.found)),
-            (shared, _SHARED, (self.shared, text_label("mm", "hint"))),
-            (each, _EACH, (self.each,)),
-            (in_plane, _MIDLINE, (self.midline,)),
-            (atlas, "Atlas", (self.atlas, self.to_atlas)),
-        ):
-            row.setSpacing(6)
-            row.addWidget(_caption(caption))
-            for field in fields:
-                row.addWidget(field, int(field in (self.specimen, self.midline, self.atlas)))
-        for row in (noise, shared, each):
-            row.addStretch(1)
-        for what in (
+        self._named, self._in_plane = QWidget(), QWidget()
+        name = _caption("Specimen"), wide(self.specimen), self.new
+        in_row(*name, margins=0, spacing=6, of=self._named)
+        in_row(_caption(_MIDLINE), wide(self.midline), margins=0, spacing=6, of=self._in_plane)
+        for part in (
             self._named,
-            choices,
-            noise,
-            shared,
-            each,
+            in_row(wide(self.side, 2), wide(self.method, 3), spacing=12),
+            in_row(_caption(_NOISE), self.noise, self.found, STRETCH, spacing=6),
+            in_row(_caption(_SHARED), self.shared, text_label("mm", "hint"), STRETCH, spacing=6),
+            in_row(_caption(_EACH), self.each, STRETCH, spacing=6),
             self.ears,
             self._in_plane,
-            atlas,
+            in_row(_caption("Atlas"), wide(self.atlas), self.to_atlas, spacing=6),
             self.problem,
         ):
-            self.add(what)
+            self.add(part)
 
     def _rename(self) -> None:
         name = self.specimen.text().strip()

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from qtpy.QtCore import QPoint, Qt, QTimer
-from qtpy.QtWidgets import QHBoxLayout, QMenu, QSizePolicy, QToolButton, QWidget
+from qtpy.QtWidgets import QMenu, QSizePolicy, QToolButton, QWidget
 
 from gp_core.errors import GpError
 from gp_labeler.document import touching
 from gp_labeler.document.touches import Touch
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import STRETCH, in_row, wide
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Notices, link
 from gp_labeler.views.panels.parts import Card, ElidedLabel
@@ -112,10 +113,7 @@ class TouchesCard(Card):
     def _lay_out(self) -> None:
         self.add_to_heading(self.guide)
         self.add_to_heading(self.clear)
-        row = QHBoxLayout()
-        row.setSpacing(4)
-        for button in self.ways.values():
-            row.addWidget(button, 1)
+        row = in_row(*map(wide, self.ways.values()), spacing=4)
         self.ways["scan"].setCheckable(True)
         self.add(row)
         self.add(self.notices)
@@ -125,15 +123,8 @@ class TouchesCard(Card):
         self.notices.setContentsMargins(11, 0, 11, 0)
         self.table.setStyleSheet("QTableView { border: none; border-radius: 0 }")
         self.add(self.table)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(11, 0, 8, 0)
-        foot.addWidget(self.more)
-        foot.addWidget(self.skull)
-        foot.addStretch(1)
-        change = QHBoxLayout()
-        change.setContentsMargins(11, 0, 11, 0)
-        change.addWidget(self.change)
-        self.add(change)
+        foot = in_row(self.more, self.skull, STRETCH, margins=(11, 0, 8, 0))
+        self.add(in_row(self.change, margins=(11, 0, 11, 0)))
         self.add(foot)
 
     def _connect(self, actions: Actions) -> None:

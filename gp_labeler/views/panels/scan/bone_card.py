@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from qtpy.QtGui import QShowEvent
-from qtpy.QtWidgets import QHBoxLayout, QPushButton, QWidget
+from qtpy.QtWidgets import QPushButton, QWidget
 
 from gp_labeler.imaging.histogram import histogram_of
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.scan import ProposeThreshold
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import STRETCH, in_row, wide
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.scan.histogram_slider import HistogramSlider
@@ -40,22 +41,20 @@ class BoneCard(Card):
         self.propose.setToolTip("Propose a threshold from the histogram")
         self.propose.clicked.connect(self._propose)
         self.add(self.slider)
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(self.box, 1)
-        row.addWidget(self.propose)
-        self.add(row)
+        self.add(in_row(wide(self.box), self.propose, spacing=8))
         self.smallest = NumberField("Smallest bone part to keep, mm", widest="100.00")
         self.smallest.step = 0.1
         self.smallest.setToolTip("Removes noise. Ossicles are more than 1 mm across")
         self.smallest.value_chosen.connect(self._choose_smallest)
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(text_label("Remove parts below", "hint"))
-        row.addWidget(self.smallest)
-        row.addWidget(text_label("mm", "hint"))
-        row.addStretch(1)
-        self.add(row)
+        self.add(
+            in_row(
+                text_label("Remove parts below", "hint"),
+                self.smallest,
+                text_label("mm", "hint"),
+                STRETCH,
+                spacing=8,
+            )
+        )
         self.add(
             text_label(
                 "Thin bone should just close. The slices show the threshold while you drag.",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from qtpy.QtGui import QAction
-from qtpy.QtWidgets import QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QSizePolicy, QToolButton, QWidget
 
 from gp_labeler.models.view import CUTS
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import in_column, in_row
 from gp_labeler.views.painting.scene_overlay import cut_text
 from gp_labeler.views.panels.action_button import Actions, action_button, do_action
 from gp_labeler.views.panels.parts import text_label
@@ -29,9 +30,7 @@ class CutRow(QWidget):
     def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
-        planes = QHBoxLayout()
-        planes.setSpacing(4)
-        planes.addWidget(text_label("Cut open", "hint"))
+        planes = in_row(text_label("Cut open", "hint"), spacing=4)
         self.planes = {plane: _plane_button(plane, actions[f"view.cut_{plane}"]) for plane in CUTS}
         for button in self.planes.values():
             planes.addWidget(button)
@@ -40,21 +39,17 @@ class CutRow(QWidget):
             action_button(actions[id], title)
             for title, id in (("Other side", "view.cut_flip"), ("To the crosshair", "view.cut_here"))
         )
-        changes = QHBoxLayout()
-        changes.setSpacing(6)
-        changes.addWidget(self.flip)
-        changes.addWidget(self.here)
+        changes = in_row(self.flip, self.here, spacing=6)
         self._more = QWidget()
-        more = QVBoxLayout(self._more)
-        more.setContentsMargins(0, 0, 0, 0)
-        more.setSpacing(4)
-        more.addWidget(self.where)
-        more.addWidget(text_label("Alt+wheel in the 3D view moves the cut.", "hint"))
-        more.addLayout(changes)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.addLayout(planes)
-        whole.addWidget(self._more)
+        in_column(
+            self.where,
+            text_label("Alt+wheel in the 3D view moves the cut.", "hint"),
+            changes,
+            margins=0,
+            spacing=4,
+            of=self._more,
+        )
+        in_column(planes, self._more, margins=0, of=self)
         for signal in (workspace.view.changed, workspace.document.reset):
             follow(self, signal, self.refresh)
         self.refresh()

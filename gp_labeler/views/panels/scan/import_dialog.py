@@ -12,7 +12,6 @@ from qtpy.QtWidgets import (
     QComboBox,
     QDialog,
     QGridLayout,
-    QHBoxLayout,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -25,6 +24,7 @@ from gp_labeler.jobs.runner import Task
 from gp_labeler.jobs.scan import InspectScan
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit
+from gp_labeler.views.layouts import in_column, in_row, wide
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
     Facts,
@@ -124,17 +124,8 @@ class ImportDialog(QDialog):
         column.addLayout(self._form())
         column.addWidget(self._sides_box())
         column.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(scrolled(content), 1)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(20, 10, 20, 14)
-        foot.setSpacing(8)
-        foot.addWidget(self.why, 1)
-        foot.addWidget(self.cancel)
-        foot.addWidget(self.load)
-        layout.addLayout(foot)
+        foot = in_row(wide(self.why), self.cancel, self.load, margins=(20, 10, 20, 14), spacing=8)
+        in_column(wide(scrolled(content)), foot, margins=0, spacing=0, of=self)
 
     def _form(self) -> QGridLayout:
         form = QGridLayout()
@@ -158,20 +149,15 @@ class ImportDialog(QDialog):
     def _sides_box(self) -> QWidget:
         """Return pictures with R and L, and the choice to reverse."""
         self.sides = QWidget()
-        column = QVBoxLayout(self.sides)
-        column.setContentsMargins(0, 4, 0, 0)
-        column.setSpacing(6)
-        column.addWidget(text_label("Which side is left?", "heading"))
+        column = in_column(
+            text_label("Which side is left?", "heading"), margins=(0, 4, 0, 0), spacing=6, of=self.sides
+        )
         words = (
             "The file does not determine it. Find a structure whose side you know, and reverse the slices "
             "if it is on the wrong side. The choice is stored with the specimen."
         )
         column.addWidget(text_label(words, "hint", wrap=True))
-        pictures = QHBoxLayout()
-        pictures.setSpacing(8)
-        for picture in self.pictures:
-            pictures.addWidget(picture, 1)
-        column.addLayout(pictures)
+        column.addLayout(in_row(*map(wide, self.pictures), spacing=8))
         self.straight = text_label("", "hint", wrap=True)
         column.addWidget(self.straight)
         column.addWidget(self.reverse)

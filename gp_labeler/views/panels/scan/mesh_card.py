@@ -11,6 +11,7 @@ from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels, text_width
 from gp_labeler.views.formatting import mm_text
+from gp_labeler.views.layouts import in_row, wide
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
@@ -51,11 +52,7 @@ class MeshCard(Card):
         self._percent = text_label("100 %")
         fit(self._percent, lambda: self._percent.setFixedWidth(text_width(self._percent, "100 %")))
         self._percent.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        row = QHBoxLayout()
-        row.addWidget(text_label("Opacity", "hint"))
-        row.addWidget(self.opacity, 1)
-        row.addWidget(self._percent)
-        self.add(row)
+        self.add(in_row(text_label("Opacity", "hint"), wide(self.opacity), self._percent))
         checks = FlowLayout(spacing=8)
         self.checks = {name: self._check(name, checks) for name in _SHOWN}
         self.add(checks)
@@ -103,11 +100,7 @@ class MeshCard(Card):
         self.ears.setToolTip("Mesh around each ear with every voxel; needs a placed feature or a ghost there")
         self.ears.clicked.connect(self._mesh_ears)
         self.save = action_button(actions["file.save_mesh"], "Save mesh…", _SAVED_AS)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(6)
-        buttons.addWidget(self.ears, 2)
-        buttons.addWidget(self.save, 1)
-        self.add(buttons)
+        self.add(in_row(wide(self.ears, 2), wide(self.save), spacing=6))
         self.progress = QProgressBar()
         self.progress.setRange(0, 100)
         self.progress.setTextVisible(False)

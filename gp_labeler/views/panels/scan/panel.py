@@ -8,6 +8,7 @@ from qtpy.QtWidgets import QVBoxLayout, QWidget
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.formatting import TIMES, size_text, spacing_text
+from gp_labeler.views.layouts import in_column
 from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
 from gp_labeler.views.panels.scan.bone_card import BoneCard
@@ -63,9 +64,7 @@ class ScanPanel(QWidget):
         for card in (about, self.bone, self.head, self.grey, self.slab, self.mesh, self.notes):
             column.addWidget(card)
         column.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolled(content))
+        in_column(scrolled(content), margins=0, of=self)
         self.setFocusProxy(self.bone.slider)
         follow(self, workspace.scan.opened, self._refresh)
         follow(self, workspace.document.reset, self._refresh)

@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import (
     QDialog,
-    QHBoxLayout,
     QListWidget,
     QListWidgetItem,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from gp_labeler.document.recovery import Recovery
 from gp_labeler.views.fonts import fit
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, placed, wide
 from gp_labeler.views.panels.parts import IconLabel, open_at, text_label
 
 __all__ = ["RecoverDialog"]
@@ -66,26 +65,19 @@ class RecoverDialog(QDialog):
         self.recover.clicked.connect(self._recover)
         self.later.clicked.connect(self.reject)
         self.delete.clicked.connect(self._delete)
-        top = QHBoxLayout()
-        top.setSpacing(12)
-        top.addWidget(IconLabel("clock", "accent_text", 24), 0, Qt.AlignmentFlag.AlignTop)
-        words = QVBoxLayout()
-        words.setSpacing(2)
-        words.addWidget(text_label("Nothing is lost", "title"))
+        top = in_row(placed(IconLabel("clock", "accent_text", 24), Qt.AlignmentFlag.AlignTop), spacing=12)
+        words = in_column(text_label("Nothing is lost", "title"), spacing=2)
         hint = "The program ended before this was saved. Every edit was kept, and you can continue."
         words.addWidget(text_label(hint, "hint", wrap=True))
         top.addLayout(words, 1)
-        foot = QHBoxLayout()
-        foot.addWidget(self.delete)
-        foot.addStretch(1)
-        foot.addWidget(self.later)
-        foot.addWidget(self.recover)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(20, 16, 20, 14)
-        layout.setSpacing(12)
-        layout.addLayout(top)
-        layout.addWidget(self.list, 1)
-        layout.addLayout(foot)
+        in_column(
+            top,
+            wide(self.list),
+            in_row(self.delete, STRETCH, self.later, self.recover),
+            margins=(20, 16, 20, 14),
+            spacing=12,
+            of=self,
+        )
 
     def _refresh(self, *_: object) -> None:
         chosen = self.list.currentItem() is not None

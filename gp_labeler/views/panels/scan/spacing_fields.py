@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QCheckBox, QComboBox, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QCheckBox, QComboBox, QHBoxLayout, QLineEdit, QPushButton, QWidget
 
 from gp_core.errors import GpError
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.typed_spacing import UNITS, spacing_in, typed_spacing
 from gp_labeler.views.fonts import field_width, fit
 from gp_labeler.views.formatting import spacing_text
+from gp_labeler.views.layouts import in_column
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import text_label
 from gp_labeler.views.signals import blocked
@@ -48,11 +49,7 @@ class SpacingFields(QWidget):
         below = FlowLayout()
         below.addWidget(self.same)
         below.addWidget(self.suggestion)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(4)
-        layout.addLayout(row)
-        layout.addLayout(below)
+        in_column(row, below, margins=0, spacing=4, of=self)
         self._on_same(True)
 
     def offer(self, suggested: Spacing | None, *, from_file: bool) -> None:

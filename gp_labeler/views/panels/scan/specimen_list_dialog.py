@@ -8,12 +8,10 @@ from qtpy.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDialog,
-    QHBoxLayout,
     QHeaderView,
     QLineEdit,
     QPushButton,
     QTableView,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -22,6 +20,7 @@ from gp_labeler.imaging.thumbnail import THUMBNAIL_SIZE
 from gp_labeler.models.specimen_list import FILTERS
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.layouts import in_column, in_row, wide
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import open_at, text_label
 from gp_labeler.views.panels.scan.specimen_table_model import COLUMNS, SpecimenTableModel
@@ -146,20 +145,11 @@ class SpecimenListDialog(QDialog):
         self.next.setProperty("role", "primary")
 
     def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.addWidget(self.search, 1)
-        top.addWidget(self.kind)
-        top.addWidget(self.add_folder)
-        top.addWidget(self.forget)
+        top = in_row(wide(self.search), self.kind, self.add_folder, self.forget)
         foot = FlowLayout()
         for widget in (self.next, self.export, self.fit_atlas, self.check, self.sheets, self.every):
             foot.addWidget(widget)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 14, 16, 12)
-        layout.setSpacing(8)
-        layout.addLayout(top)
-        layout.addWidget(self.words)
-        layout.addWidget(self.table, 1)
+        layout = in_column(top, self.words, wide(self.table), margins=(16, 14, 16, 12), spacing=8, of=self)
         layout.addStretch(0)
         layout.addLayout(foot)
 

@@ -21,6 +21,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import elided, fit, font_of, pixels, text_width
 from gp_labeler.views.icons import icon, icon_pixmap
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import emptied, scrolled
@@ -84,11 +85,7 @@ class Welcome(QWidget):
     def _lay_out(self) -> None:
         page = QWidget()
         fit(page, lambda: page.setMaximumWidth(pixels(page, 820)))
-        column = QVBoxLayout(page)
-        column.setContentsMargins(32, 24, 32, 24)
-        column.setSpacing(8)
-        column.addStretch(1)
-        column.addLayout(self._head())
+        column = in_column(STRETCH, self._head(), margins=(32, 24, 32, 24), spacing=8, of=page)
         column.addSpacing(12)
         column.addLayout(self._buttons())
         column.addSpacing(4)
@@ -99,9 +96,7 @@ class Welcome(QWidget):
         self._recent = QVBoxLayout()
         self._recent.setSpacing(2)
         for name, below in (("Recent", self._recent), ("How it works", self._tutorial())):
-            part = QVBoxLayout()
-            part.addWidget(_text(name, "heading"))
-            part.addLayout(below)
+            part = in_column(_text(name, "heading"), below)
             self._lower.addLayout(part, 1)
         column.addLayout(self._lower)
         column.addStretch(2)
@@ -109,9 +104,7 @@ class Welcome(QWidget):
 
     def _head(self) -> QHBoxLayout:
         """Return the title with a drawing of the head beside it."""
-        words = QVBoxLayout()
-        words.setSpacing(4)
-        words.addStretch(1)
+        words = in_column(STRETCH, spacing=4)
         title = _text("Label a guinea-pig head", "hero")
         words.addWidget(title)
         what = "20 features on each side of a micro-CT, on bone and on slices."
@@ -120,24 +113,14 @@ class Welcome(QWidget):
         self.picture = FeaturePicture()
         self.picture.show_feature("IN", Side.RIGHT)
         fit(self.picture, lambda: self.picture.setFixedSize(pixels(self, 300), pixels(self, 150)))
-        row = QHBoxLayout()
-        row.setSpacing(24)
-        row.addLayout(words, 1)
-        row.addWidget(self.picture)
-        return row
+        return in_row(wide(words), self.picture, spacing=24)
 
     def _put(self, page: QWidget) -> None:
         """Centre the page, and let it scroll in a small window."""
         middle = QWidget()
         middle.setProperty("role", "panel")
-        row = QHBoxLayout(middle)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.addStretch(1)
-        row.addWidget(page, 8)
-        row.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolled(middle))
+        in_row(STRETCH, wide(page, 8), STRETCH, margins=0, of=middle)
+        in_column(scrolled(middle), margins=0, of=self)
 
     def _buttons(self) -> FlowLayout:
         row = FlowLayout(spacing=8)

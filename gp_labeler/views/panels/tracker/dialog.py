@@ -16,7 +16,6 @@ from qtpy.QtWidgets import (
     QLineEdit,
     QProgressBar,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -27,6 +26,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.tracker.address import DEFAULT_PORT
 from gp_labeler.views.fonts import field_width, fit, text_width
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, open_at, scrolled, text_label
 from gp_labeler.views.panels.tracker.card import tracker_role, tracker_words
@@ -296,24 +296,23 @@ class TrackerDialog(QDialog):
     def _lay_out(self) -> None:
         content = QWidget()
         content.setProperty("role", "panel")
-        column = QVBoxLayout(content)
-        column.setContentsMargins(16, 16, 16, 8)
-        column.setSpacing(8)
-        for part in (self._link_card(), self._tip_card(), self._send_card(), self.audible):
-            column.addWidget(part)
-        column.addStretch(1)
+        in_column(
+            self._link_card(),
+            self._tip_card(),
+            self._send_card(),
+            self.audible,
+            STRETCH,
+            margins=(16, 16, 16, 8),
+            spacing=8,
+            of=content,
+        )
         close = QPushButton("Close")
         close.setAutoDefault(False)
         close.clicked.connect(self.accept)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(16, 4, 16, 12)
-        foot.addWidget(self.problem, 1)
+        foot = in_row(wide(self.problem), margins=(16, 4, 16, 12))
         foot.addStretch(0)
         foot.addWidget(close, 0, Qt.AlignmentFlag.AlignRight)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolled(content), 1)
-        layout.addLayout(foot)
+        in_column(wide(scrolled(content)), foot, margins=0, of=self)
 
     def _link_card(self) -> Card:
         card, form = Card("OpenIGTLink server"), _form()
@@ -321,11 +320,7 @@ class TrackerDialog(QDialog):
             form.addRow(_HINTS[name][0], self.fields[name])
         card.add(form)
         card.add(self.still)
-        row = QHBoxLayout()
-        row.setSpacing(12)
-        row.addWidget(self.connect_button)
-        row.addWidget(self.words, 1)
-        card.add(row)
+        card.add(in_row(self.connect_button, wide(self.words), spacing=12))
         return card
 
     def _tip_card(self) -> Card:
@@ -336,21 +331,12 @@ class TrackerDialog(QDialog):
         card.add(form)
         card.add(self.pivot_words)
         card.add(self.turned)
-        row = QHBoxLayout()
-        row.addWidget(self.pivot)
-        row.addWidget(self.finish)
-        row.addStretch(1)
-        card.add(row)
+        card.add(in_row(self.pivot, self.finish, STRETCH))
         return card
 
     def _send_card(self) -> Card:
         card = Card("Send the pose")
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(self.send)
-        row.addWidget(text_label("on port", "hint"))
-        row.addWidget(self.send_port)
-        row.addStretch(1)
+        row = in_row(self.send, text_label("on port", "hint"), self.send_port, STRETCH, spacing=8)
         card.add(self.send_words)
         card.add(row)
         card.add(
