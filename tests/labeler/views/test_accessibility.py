@@ -73,8 +73,8 @@ def test_a_message_says_by_a_word_what_its_colour_says_and_screen_readers_are_to
     monkeypatch.setattr(
         QtGui.QAccessible, "updateAccessibility", lambda e: told.append((e.message(), e.politeness().name))
     )
-    for level, word in (("info", ""), ("warning", "Warning: "), ("error", "Error: ")):
+    texts = ["The scan has no bone", "Warning: the scan has no bone", "Error: the scan has no bone"]
+    for level, text in zip(("info", "warning", "error"), texts, strict=True):
         one_window.workspace.say("the scan has no bone", level)
-        assert one_window.status.next_click.text() == f"{word}the scan has no bone"
-    texts = ["the scan has no bone", "Warning: the scan has no bone", "Error: the scan has no bone"]
+        assert one_window.status.next_click.text() == text
     assert told == list(zip(texts, ("Polite", "Assertive", "Assertive"), strict=True))
