@@ -37,7 +37,7 @@ _LEAST_OVERLAP = 0.25
 _WHOLE = (0.65, 0.7, 0.12)
 """Least agreement, overlap and margin of a head that lies in the scan as a whole."""
 
-_PART = (0.82, 0.25, 0.05)
+_PART = (0.82, 0.4, 0.1)
 """The same where much of the head is missing: agreement must be higher."""
 
 _CLEAR = (0.58, 0.6, 0.2)
