@@ -73,10 +73,10 @@ def _check(args: argparse.Namespace) -> int:
     from gp_labeler.jobs.library_sheet import draw_library_check
 
     engine = engine_named(args.engine)
-    if engine == "demons":
-        sys.stderr.write(f"gp-labeler: {COARSER}\n")
     library = library_of(args.labelled, args)
     require_enough(library.scans)
+    if engine == "demons":
+        sys.stderr.write(f"gp-labeler: {COARSER}\n")
     with protected_inputs(args.labelled), open_executor(args.workers, args.scheduler) as executor:
         prepare(library, engine, executor)
         predictions = library.held_out(HereRegistration(engine))
