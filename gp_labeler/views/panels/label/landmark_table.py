@@ -246,7 +246,7 @@ class _ChipDelegate(QStyledItemDelegate):
         is_over = bool(option.state & QStyle.StateFlag.State_MouseOver)
         if bool(index.data(ACTIVE_ROLE)) or (is_row and index.column() == 0):
             painter.fillRect(box, QColor(theme.selected))
-        elif is_over or is_row:
+        elif is_over:
             painter.fillRect(box, QColor(theme.hover))
         if view.hasFocus() and view.currentIndex() == index:
             painter.setPen(QPen(QColor(theme.focus), 2))
