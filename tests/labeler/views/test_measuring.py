@@ -219,6 +219,10 @@ def test_the_list_renames_shows_and_removes(qtbot, window) -> None:
     QTest.mouseClick(table.viewport(), LEFT, pos=middle)
     assert workspace.measure.selected == "Ruler 2"
     assert np.allclose(workspace.view.crosshair, OTHER)
+    for keys, name in (((Qt.Key.Key_Up,), "bulla width"), ((Qt.Key.Key_Down,), "Ruler 2")):
+        for key in (*keys, Qt.Key.Key_Return):  # the same by keys
+            QTest.keyClick(table, key)
+        assert workspace.measure.selected == name
     QTest.keyClick(table, Qt.Key.Key_Delete)
     assert [each.name for each in measured(window)] == ["bulla width"]
     assert table.rowCount() == 1

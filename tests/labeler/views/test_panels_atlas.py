@@ -97,6 +97,9 @@ def test_labels_are_compared_with_it_and_problems_flagged(workspace, panel, qtbo
     index = table.rows.index(table.rows.codes.index("OI"), 2)
     qtbot.mouseClick(table.viewport(), CLICK, pos=table.visualRect(index).center())
     assert (workspace.labels.active.side, workspace.labels.active.code) == (L, "OI")
+    for key in (Qt.Key.Key_Down, Qt.Key.Key_Return):  # the same by keys
+        qtbot.keyClick(table, key)
+    assert (workspace.labels.active.side, workspace.labels.active.code) == (L, "OS")
 
 
 def test_points_with_another_problem_are_named_beside_the_table(workspace, panel) -> None:
