@@ -23,7 +23,7 @@ if os.environ.get("GP_LABELER_CANVAS") == "native":  # before the application is
     share_contexts()
 
 
-_DRAWN = ("views", "scene")
+_DRAWN = ("views", "scene", "scripting")
 """Folders of tests that show or draw something; `scripting/test_leaks.py` looks at whole scripts."""
 
 
