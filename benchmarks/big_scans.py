@@ -401,6 +401,7 @@ def typed_file(folder: Path, name: str) -> Path:
     path = folder / f"scan-256-{name}.nrrd"
     head, _, voxels = plain.read_bytes().partition(b"\n\n")
     values = np.frombuffer(voxels, "<u2") // (8 if name == "uint8" else 1)
+    head = head.replace(str(SPACING).encode(), b"0.05")  # shorter than a head could be, else
     nrrd = {"float32": "float", "float64": "double"}.get(name, name)
     header = head.replace(b"type: uint16", f"type: {nrrd}".encode())
     path.write_bytes(header + b"\n\n" + values.astype(name).tobytes())
