@@ -200,36 +200,21 @@ def run(args: argparse.Namespace) -> int:
     """
     path = _path_of(args)
     given = _given(args)
-    asked = given.inputs
     own_atlas = f" with atlas {' '.join(args.atlas)}" if args.atlas not in (None, ["published"]) else ""
     with blaming(args.touches + own_atlas):
         touches, pose, taken = _estimated(args, given)
-        next_touches = (
-            ()
-            if asked.atlas is None
-            else gains(touches, asked.atlas, probe_noise=asked.probe_noise, shared_error=asked.shared_error)
-        )
+        next_touches = _next_touches(given.inputs, touches)
     pose = _with_other_ear(args, given, pose)
-    others = _other_reasons(asked.source, pose, taken)
+    others = _other_reasons(given.inputs.source, pose, taken)
     answer = pose_answer(pose, others, accept_warnings=args.accept_warnings)
     held_back = answer["status"] == WITHHELD
-    ambiguities = [reason["text"] for reason in answer["reasons"]]
     _write(args, pose, answer, path, held_back=held_back)
     for line in pose_table(pose, shown_name(args.touches), next_touches):
         say(line)
-    for line in _ear_lines(pose):
+    remarks = _remarks(args, touches, pose, path, held_back=held_back)
+    compared = _compared(pose, given.pose, args.touches)
+    for line in (*_ear_lines(pose), *_taken_lines(taken), *remarks, *_gate_lines(args, answer), *compared):
         say(f"  {line}")
-    if taken is not None:
-        odds = f"{100 * taken.probability:.1f} %"
-        say(f"  ! used as {taken.label}, which is more likely than the given names and side ({odds})")
-    for line in _remarks(args, touches, pose, path, held_back=held_back):
-        say(f"  {line}")
-    if held_back:
-        say(f"  ! {_what_was_held_back(args, ambiguities)}")
-    elif ambiguities:
-        say("  ! written in spite of these warnings: --accept-warnings was given")
-    if given.pose is not None:
-        say(f"  {_compared(pose, given.pose, args.touches)}")
     return HELD_BACK if held_back else 0
 
 
@@ -339,14 +324,33 @@ def _ear_lines(pose: CochleaPose) -> Iterator[str]:
         yield f"{'! ' if skull['moved'] else ''}{skull['text']}"
 
 
-def _compared(pose: CochleaPose, stored: CochleaPose, file: str) -> str:
-    """Say how an estimate differs from that of the file which it was made from."""
+def _taken_lines(taken: Hypothesis | None) -> Iterator[str]:
+    """Yield what ``--take-best`` took."""
+    if taken is not None:
+        odds = f"{100 * taken.probability:.1f} %"
+        yield f"! used as {taken.label}, which is more likely than the given names and side ({odds})"
+
+
+def _gate_lines(args: argparse.Namespace, answer: Mapping[str, Any]) -> Iterator[str]:
+    """Yield whether files were held back, or written in spite of warnings."""
+    reasons = [reason["text"] for reason in answer["reasons"]]
+    if answer["status"] == WITHHELD:
+        yield f"! {_what_was_held_back(args, reasons)}"
+    elif reasons:
+        yield "! written in spite of these warnings: --accept-warnings was given"
+
+
+def _compared(pose: CochleaPose, stored: CochleaPose | None, file: str) -> Iterator[str]:
+    """Yield how an estimate differs from that of the pose file which it was made from, if it was."""
+    if stored is None:
+        return
     name = shown_name(file)
     if np.array_equal(pose.transform, stored.transform) and pose.as_dict() == stored.as_dict():
-        return f"identical to {name}"
+        yield f"identical to {name}"
+        return
     mm = float(np.linalg.norm(pose.origin - stored.origin))
     degrees = float(angle_between_deg(pose.axis, stored.axis))
-    return f"CO lies {mm:.2g} mm from that of {name}, the axis {degrees:.2g} deg"
+    yield f"CO lies {mm:.2g} mm from that of {name}, the axis {degrees:.2g} deg"
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -368,6 +372,13 @@ def _estimated(args: argparse.Namespace, given: _Given) -> tuple[LandmarkSet, Co
         return given.inputs.touches, pose, None
     touches = read_as(given.inputs.touches, best)
     return touches, given.estimate(touches), best
+
+
+def _next_touches(inputs: EstimateInputs, touches: LandmarkSet) -> tuple[TouchGain, ...]:
+    """Return what each further touch would gain; nothing without an atlas."""
+    if inputs.atlas is None:
+        return ()
+    return gains(touches, inputs.atlas, probe_noise=inputs.probe_noise, shared_error=inputs.shared_error)
 
 
 def _other_reasons(source: str, pose: CochleaPose, taken: Hypothesis | None) -> list[GateReason]:
