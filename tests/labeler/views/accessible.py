@@ -117,14 +117,19 @@ def _luminance(packed: np.ndarray) -> np.ndarray:
 def focus_contrast(widget: QWidget, root: QWidget) -> float:
     """Return how well it is seen that a widget has the keyboard: the contrast of a pixel with and without.
 
-    As many pixels as half its outline has change at least that much: those of a caret are too few.
+    As many pixels as half its outline has change at least that much: those of a caret are too few. It is 21 for a
+    widget that is not seen, as one that a job has hidden by its end.
     """
     box = _seen_part(widget, root)
+    if box.isEmpty():
+        return 21.0
     root.setFocus()
     QApplication.processEvents()
     before = _luminance(_pixels(root, box))
     widget.setFocus(Qt.FocusReason.TabFocusReason)
     QApplication.processEvents()
+    if not widget.hasFocus() and not widget.isVisible():
+        return 21.0
     after = _luminance(_pixels(root, box))
     ratio = (np.maximum(before, after) + 0.05) / (np.minimum(before, after) + 0.05)
     least = min(box.width() + box.height(), _CARET)

@@ -74,9 +74,11 @@ def found(qapp, tmp_path_factory) -> dict[str, set[str]]:
         if not WHOLE:
             walk.look(state, root)
 
-    walk_states(window, tmp_path_factory.mktemp("states"), look)
-    fonts.use_family(None)
-    close(window)
+    try:
+        walk_states(window, tmp_path_factory.mktemp("states"), look)
+    finally:
+        fonts.use_family(None)
+        close(window)
     return walk.found
 
 
