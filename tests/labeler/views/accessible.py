@@ -117,8 +117,8 @@ def _luminance(packed: np.ndarray) -> np.ndarray:
 def focus_contrast(widget: QWidget, root: QWidget) -> float:
     """Return how well it is seen that a widget has the keyboard: the contrast of a pixel with and without.
 
-    As many pixels as half its outline has change at least that much: those of a caret are too few. It is 21 for a
-    widget that is not seen, as one that a job has hidden by its end.
+    As many pixels as half its outline has change at least that much: those of a caret are too few. It is 21
+    for a widget that is not seen, as one that a job has hidden by its end.
     """
     box = _seen_part(widget, root)
     if box.isEmpty():
