@@ -132,7 +132,7 @@ def drawing_alone(window: MainWindow, whole: float) -> None:
     for _ in range(20):
         view._show_points()
         start = time.perf_counter()
-        view.draw_frame(quick=True)
+        view.draw_frame()
         taken.append(time.perf_counter() - start)
     ms, top = 1e3 * float(np.median(taken)), 1e3 * max(taken)
     print(
