@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT)]
 
 import numpy as np  # noqa: E402
-from qtpy.QtCore import QPoint, QPointF, Qt, QTimer  # noqa: E402
+from qtpy.QtCore import QEventLoop, QPoint, QPointF, Qt, QTimer  # noqa: E402
 from qtpy.QtTest import QTest  # noqa: E402
 
 from gp_core.validation import FloatArray  # noqa: E402
@@ -72,12 +72,19 @@ def sphere_field(millions: float) -> Volume:
     return Volume.from_parts(values.astype(np.int16), [1 / PER_MM] * 3, [0.0, 0.0, 0.0], name="balls")
 
 
+def wait(ms: int) -> None:
+    """Let the event loop run; `QTest.qWait` keeps Python's lock, and jobs would take three times as long."""
+    loop = QEventLoop()
+    QTimer.singleShot(ms, loop.quit)
+    loop.exec()
+
+
 def rest(window: MainWindow) -> None:
     """Wait until all work is done and the bone is drawn finely."""
     view = window.grid.scene_view
     while window.workspace.jobs.running or not view.scene.is_fine:
-        QTest.qWait(20)
-    QTest.qWait(50)
+        wait(20)
+    wait(50)
 
 
 def whole_redraw_seconds(window: MainWindow) -> float:
@@ -145,7 +152,7 @@ def place(window: MainWindow) -> None:
     view = window.grid.scene_view
     for x, y in seen(window):
         QTest.mouseClick(view, LEFT, Qt.KeyboardModifier.NoModifier, QPoint(int(x), int(y)))
-        QTest.qWait(60)
+        wait(60)
 
 
 def seen(window: MainWindow) -> FloatArray:
@@ -167,7 +174,7 @@ def turn(window: MainWindow) -> None:
     QTest.mousePress(view, LEFT, Qt.KeyboardModifier.NoModifier, middle.toPoint())
     for n in range(N_TURNS):
         QTest.mouseMove(view, (middle + QPointF(3.0 * n, 1.0 * n)).toPoint())
-        QTest.qWait(16)
+        wait(16)
     QTest.mouseRelease(view, LEFT, Qt.KeyboardModifier.NoModifier, view.rect().center())
     rest(window)
 
@@ -186,7 +193,7 @@ def cut(window: MainWindow) -> None:
     window.commands.run("view.cut_coronal")
     for _ in range(10):
         window.commands.run("view.cut_deeper")
-        QTest.qWait(16)
+        wait(16)
     window.commands.run("view.cut_coronal")
     rest(window)
 
@@ -203,7 +210,7 @@ def mesh(window: MainWindow) -> None:
     for job in jobs:
         workspace.jobs.submit(job)
     while workspace.jobs.running:
-        QTest.qWait(5)
+        wait(5)
 
 
 def mesh_and_show(window: MainWindow) -> None:
@@ -215,7 +222,7 @@ def mesh_and_show(window: MainWindow) -> None:
 
 
 CASES: tuple[tuple[str, Callable[[MainWindow], None]], ...] = (
-    ("nothing happens", lambda window: QTest.qWait(300)),
+    ("nothing happens", lambda window: wait(300)),
     (f"{N_POINTS} points are placed by clicks", place),
     (f"the bone is turned, {N_TURNS} steps, and rests", turn),
     ("bone is drawn finely from 3 new viewpoints", refine),
