@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from qtpy.QtWidgets import QVBoxLayout, QWidget
+from qtpy.QtWidgets import QWidget
 
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import in_column
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import text_label
@@ -36,11 +37,7 @@ class LeftRow(QWidget):
         answers.setLayout(row)
         for button in (self.confirm, self.exchanged):
             row.addWidget(button)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(12, 4, 12, 0)
-        layout.setSpacing(4)
-        layout.addWidget(self.question)
-        layout.addWidget(answers)
+        in_column(self.question, answers, margins=(12, 4, 12, 0), spacing=4, of=self)
         for signal in (workspace.head.changed, workspace.document.reset):
             follow(self, signal, self.refresh)
         self.refresh()
