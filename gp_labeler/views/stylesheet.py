@@ -97,7 +97,8 @@ QComboBox QAbstractItemView {
     selection-color: $on_accent; outline: none;
 }
 QCheckBox, QRadioButton {
-    spacing: 6px; padding: 1px 2px; background: transparent; border: 2px solid transparent; border-radius: 5px;
+    spacing: 6px; padding: 1px 2px; background: transparent;
+    border: 2px solid transparent; border-radius: 5px;
 }
 QCheckBox:focus, QRadioButton:focus { border-color: $focus; }
 QCheckBox::indicator {
