@@ -184,6 +184,15 @@ def test_a_missing_extra_is_one_line_that_names_it(
     assert f'Run pip install "gp-labeler[{extra}]"' in done.stderr
 
 
+@pytest.mark.slow
+def test_the_doctor_of_the_wheel_alone_says_what_to_install(alone: Path, files: Path) -> None:
+    done = _run(alone / "gp-labeler", "doctor", cwd=files)
+    assert (done.returncode, done.stderr) == (2, "")
+    missing = [line.split()[0] for line in done.stdout.splitlines() if line.endswith(" missing")]
+    assert {"vtk", "qtpy", "simpleitk"} <= set(missing)
+    assert 'are not installed. Run pip install "gp-labeler[app]"' in done.stdout
+
+
 @pytest.mark.parametrize(("module", "passes"), [("gp_core.anything", False), ("numpy.linalg", True)])
 def test_a_warning_is_an_error_in_our_modules_only(tmp_path: Path, module: str, passes: bool) -> None:
     warn = f"warnings.warn_explicit('old', DeprecationWarning, 'a.py', 1, module={module!r})"

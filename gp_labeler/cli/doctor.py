@@ -22,10 +22,11 @@ from gp_core.errors import GpError
 from gp_labeler.system.installation import INSTALL, check_display, explain_import
 from gp_labeler.system.libraries import advice, missing
 from gp_labeler.system.qt_binding import BINDINGS, choose_binding
+from gp_labeler.system.requirements import Requirement, requirements_of
 
 __all__ = ["Examination", "examine", "make_doctor_parser", "run_doctor"]
 
-_EXTRAS = ("", "app")
+_EXTRAS = ("app",)
 _ENOUGH_BYTES = 200e6
 _PROBE_SECONDS = 120.0
 _CAPABILITIES = {"OpenGL version string": "version", "OpenGL renderer string": "renderer"}
@@ -109,31 +110,36 @@ def _binding(found: Examination) -> None:
     """Say which Qt binding the window would use."""
     try:
         package = BINDINGS[choose_binding()]
-        found.note("Machine", f"Qt binding {package} {metadata.version(package)}")
     except GpError as error:
         found.wrong.append(str(error))
-    except metadata.PackageNotFoundError:  # PySide6-Essentials brings PySide6; what is missing is told below
-        found.note("Machine", f"Qt binding {package}")
+        return
+    distributions = (package, f"{package}-Essentials")  # either brings PySide6
+    versions = [version for name in distributions if (version := Requirement(name, "").installed())]
+    found.note("Machine", f"Qt binding {package} {versions[0] if versions else '(not installed)'}")
 
 
 def _packages(found: Examination) -> None:
     """Compare what is installed with what the distribution asks for."""
-    from packaging.requirements import Requirement
+    absent = []
+    for asked in requirements_of(_asked_for(found), _EXTRAS):
+        version = asked.installed()
+        found.note("Packages", f"{asked.name:24} {version or 'missing'}")
+        if version is None:
+            absent.append(asked.name)
+        elif not asked.allows(version):
+            wanted = f"{asked.name}{asked.bounds}"
+            found.wrong.append(f'{asked.name} {version} does not fit. Run pip install "{wanted}"')
+    if absent:
+        are = "is" if len(absent) == 1 else "are"
+        found.wrong.append(f"{', '.join(absent)} {are} not installed. Run {INSTALL}")
 
-    for text in metadata.requires("gp-labeler") or []:
-        asked = Requirement(text)
-        if asked.marker and not any(asked.marker.evaluate({"extra": extra}) for extra in _EXTRAS):
-            continue
-        try:
-            version = metadata.version(asked.name)
-        except metadata.PackageNotFoundError:
-            found.note("Packages", f"{asked.name:24} missing")
-            found.wrong.append(f"The package {asked.name} is not installed. Run {INSTALL}")
-            continue
-        found.note("Packages", f"{asked.name:24} {version}")
-        if not asked.specifier.contains(version, prereleases=True):
-            wanted = f"{asked.name}{asked.specifier}"
-            found.wrong.append(f'{asked.name} {version} is too old. Run pip install "{wanted}"')
+
+def _asked_for(found: Examination) -> list[str]:
+    try:
+        return metadata.requires("gp-labeler") or []
+    except metadata.PackageNotFoundError:  # a folder of its own (tools/freeze), or the source alone
+        found.note("Packages", "not known: gp-labeler is not installed as a package")
+        return []
 
 
 def _libraries(found: Examination) -> None:
@@ -232,9 +238,8 @@ def _state_folder(found: Examination) -> None:
         from gp_labeler.document.paths import default_directory
     except ImportError as error:
         found.note("State folder", "unknown")
-        problem = str(explain_import(error))
-        if not any(line.casefold().startswith(problem[:30].casefold()) for line in found.wrong):
-            found.wrong.append(problem)
+        if not any(error.name and error.name in line for line in found.wrong):
+            found.wrong.append(str(explain_import(error)))
         return
     folder = default_directory()
     there = next(path for path in (folder, *folder.parents) if path.exists())

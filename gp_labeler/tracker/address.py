@@ -6,11 +6,9 @@ import re
 from dataclasses import dataclass
 
 from gp_core.errors import GpError
+from gp_labeler.system.openigtlink import DEFAULT_PORT
 
-__all__ = ["DEFAULT_PORT", "TrackerAddress", "check_device", "check_host", "check_port"]
-
-DEFAULT_PORT = 18944
-"""The port that OpenIGTLink servers listen on by custom."""
+__all__ = ["TrackerAddress", "check_device", "check_host", "check_port"]
 
 _LONGEST_DEVICE = 20
 _FROM_TO = re.compile(r"(?P<of>.+)To(?P<frame>[A-Z].*)")

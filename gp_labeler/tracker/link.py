@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from gp_labeler.system.openigtlink import POSE_KINDS
 from gp_labeler.tracker.address import TrackerAddress
 from gp_labeler.tracker.connection import Arrived, Connection, Event, Lost, Opened
 from gp_labeler.tracker.messages import TrackerMessage, hello
-from gp_labeler.tracker.pose_bodies import POSE_KINDS
 from gp_labeler.tracker.sample_filter import SampleFilter
 from gp_labeler.tracker.samples import Fault, Limits, Sample
 

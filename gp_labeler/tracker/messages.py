@@ -18,7 +18,8 @@ import pyigtl
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
-from gp_labeler.tracker.pose_bodies import KINDS, POSE_KINDS, read_tools
+from gp_labeler.system.openigtlink import KINDS, POSE_KINDS
+from gp_labeler.tracker.pose_bodies import read_tools
 
 __all__ = ["MessageDecoder", "TrackerMessage", "hello", "pack_transform"]
 
@@ -49,7 +50,7 @@ class TrackerMessage:
     received : float
         When it arrived, seconds of this computer's monotonic clock.
     matrix : (4, 4) array, optional
-        Of a message of one of `gp_labeler.tracker.pose_bodies.POSE_KINDS`, as sent.
+        Of a message of one of `gp_labeler.system.openigtlink.POSE_KINDS`, as sent.
     oriented : bool
         Whether the rotation of the matrix was sent; else only the position was.
     text : str

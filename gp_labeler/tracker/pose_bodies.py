@@ -17,18 +17,13 @@ from scipy.spatial.transform import Rotation
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
+from gp_labeler.system.openigtlink import KINDS
 
-__all__ = ["KINDS", "POSE_KINDS", "PoseBody", "ToolPose", "read_tools"]
+__all__ = ["PoseBody", "ToolPose", "read_tools"]
 
 _TDATA = struct.Struct("> 20s B B 12f")
 _QTDATA = struct.Struct("> 20s B B 7f")
 _POINT = struct.Struct("> 64s 32s 4B 3f f 20s")
-
-KINDS = ("TDATA", "QTDATA", "POSITION", "QTRANS", "POINT")
-"""Message types that this module reads."""
-
-POSE_KINDS = ("TRANSFORM", *KINDS)
-"""Message types that carry a pose, or a position."""
 
 _FLOATS_OF_POSITION = (3, 6, 7)
 """Position alone; with x, y, z of the quaternion; with all of it."""
@@ -117,12 +112,12 @@ def _text(value: object) -> str:
 
 
 class PoseBody(pyigtl.MessageBase):  # type: ignore[misc]
-    """A message of one of `KINDS`, to be sent.
+    """A message of one of `gp_labeler.system.openigtlink.KINDS`, to be sent.
 
     Parameters
     ----------
     kind : str
-        One of `KINDS`.
+        The type of the message.
     tools : sequence of ToolPose
         What it carries; POSITION carries the first.
     device : str

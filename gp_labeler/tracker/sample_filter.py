@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gp_core.validation import FloatArray
+from gp_labeler.system.openigtlink import POSE_KINDS
 from gp_labeler.tracker.device_clock import DeviceClock
 from gp_labeler.tracker.jump_filter import JumpFilter
 from gp_labeler.tracker.messages import TrackerMessage
-from gp_labeler.tracker.pose_bodies import POSE_KINDS
 from gp_labeler.tracker.rigid import nearest_rigid, why_not_rigid
 from gp_labeler.tracker.samples import UNTIMELY, Fault, Limits, Sample
 

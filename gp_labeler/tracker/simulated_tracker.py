@@ -15,14 +15,11 @@ import pyigtl
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
-from gp_labeler.tracker.address import DEFAULT_PORT
+from gp_labeler.system.openigtlink import DEFAULT_PORT
 from gp_labeler.tracker.pose_bodies import PoseBody, ToolPose
 from gp_labeler.tracker.simulated_probe import Reading, SimulatedProbe
 
-__all__ = ["HIDDEN_BY", "Simulator"]
-
-HIDDEN_BY = ("status", "identity", "stop")
-"""How a covered marker is told: by metadata and identity, by an identity alone, or by no message."""
+__all__ = ["Simulator"]
 
 _LONGEST_S, _FARTHEST_MM = 3600.0, 1000.0
 """What a command can ask for."""
@@ -89,7 +86,7 @@ class Simulator:
     hidden : {"status", "identity", "stop"}
         How a covered marker is told: PLUS does any of the three, by its settings and the client's version.
     kind : str
-        Type of the messages of poses, one of `gp_labeler.tracker.pose_bodies.POSE_KINDS`.
+        Type of the messages of poses, one of `gp_labeler.system.openigtlink.POSE_KINDS`.
     say : callable
         Told what has been done, in one line.
     """

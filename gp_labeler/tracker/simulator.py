@@ -1,7 +1,4 @@
-"""The command that serves a simulated tracker, in a process of its own: for tests, the demo and training.
-
-``python -m gp_labeler.tracker.simulator --help`` says how it is used.
-"""
+"""What ``gp-labeler simulate-tracker`` does: it serves a simulated tracker until it is told to quit."""
 
 from __future__ import annotations
 
@@ -12,86 +9,50 @@ import math
 import signal
 import sys
 import threading
-from collections.abc import Sequence
-from pathlib import Path
 from queue import SimpleQueue
 
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.sampling import draw_animal
-from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs, read_bytes, write_text
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.io import read_touches
 from gp_core.landmarks.features import EXTERNAL, PROBE, Side
-from gp_core.standard_streams import STANDARD, standard_streams
+from gp_core.standard_streams import STANDARD
 from gp_core.validation import FloatArray
-from gp_labeler.tracker.address import DEFAULT_PORT, check_device
-from gp_labeler.tracker.pose_bodies import POSE_KINDS
+from gp_labeler.tracker.address import check_device
 from gp_labeler.tracker.rigid import rotation_of
 from gp_labeler.tracker.simulated_probe import SimulatedProbe
-from gp_labeler.tracker.simulated_tracker import HIDDEN_BY, Simulator
+from gp_labeler.tracker.simulated_tracker import Simulator
 
-__all__ = ["main", "make_parser"]
-
-_PROG = "python -m gp_labeler.tracker.simulator"
-
-_COMMANDS = """commands, one per line, in a script or typed with --live:
-  go NAME [SECONDS]            send the tip to a point, or home
-  lift [MM] [SECONDS]          lift it off
-  wait SECONDS
-  turn [SECONDS]               tilt the probe about its tip, for a pivot calibration
-  still                        end a turn that was given no time
-  hide [probe|reference]       cover a marker
-  show                         uncover both
-  jump MM [SECONDS]            report the probe at a wrong place; without SECONDS in one message
-  late SECONDS                 hold messages back for so long; 0 ends that
-  bad KIND                     one bad message: nan, scale, mirror, repeat, back
-  stale [SECONDS]              repeat the last position, as if it were new
-  press                        press the button (a STRING message, 1 and then 0)
-  cut [SECONDS]                close the connection, and come back
-  quit
-"""
+__all__ = ["serve", "simulate"]
 
 
-def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
+def simulate(args: argparse.Namespace) -> int:
     """Serve until told to quit.
 
     Parameters
     ----------
-    arguments : sequence of str, optional
-        Of the command line; by default this process's.
-    prog : str
-        What the command is called.
+    args : argparse.Namespace
+        The options of ``gp-labeler simulate-tracker``.
 
     Returns
     -------
     int
-        0; 2 where the input is wrong, said in one line.
+        0.
+
+    Raises
+    ------
+    GpError
+        A file or an option is wrong.
+    OSError
+        The port is taken.
     """
-    parser = make_parser(prog)
-    args = parser.parse_args(arguments)
-    if args.seed < 0:
-        parser.error(f"--seed must be 0 or more, got {args.seed}")
     logging.getLogger("pyigtl").setLevel(logging.ERROR)
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)  # it ends in good order
-    try:
-        with standard_streams(args, {}, ("touches", "script")):
-            return _simulate(args)
-    except GpError as error:
-        sys.stderr.write(f"simulator: {error}\n")
-    except OSError as error:
-        why = error.strerror or error
-        sys.stderr.write(
-            f"simulator: cannot listen at port {args.port} ({why}). Choose another with --port.\n"
-        )
-    return 2
-
-
-def _simulate(args: argparse.Namespace) -> int:
     points, truth = _points(args)
     simulator = _simulator(args, points)
     told = json.dumps({**truth, "port": simulator.port}, indent=2)
@@ -195,85 +156,3 @@ def _points(args: argparse.Namespace) -> tuple[dict[str, FloatArray], dict[str, 
 
 def _listed(points: dict[str, FloatArray]) -> dict[str, list[float]]:
     return {name: [float(x) for x in place] for name, place in points.items()}
-
-
-def make_parser(prog: str = _PROG) -> argparse.ArgumentParser:
-    """Return the parser of the simulator's command line."""
-    parser = CommandParser(
-        prog=prog,
-        description="Serve a simulated tracked probe over OpenIGTLink, on this computer only.",
-        epilog=_COMMANDS,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument(
-        "--port", type=int, default=DEFAULT_PORT, help="port; default: %(default)s; 0: any free port"
-    )
-    head = parser.add_argument_group("the head")
-    head.add_argument(
-        "--touches", type=Path, metavar="FILE", help="points to touch; default: those of a simulated animal"
-    )
-    head.add_argument("--side", default="L", metavar="L|R", help="side of the head; default: L")
-    head.add_argument("--seed", type=int, default=0, help="seed of the simulated animal and of the noise")
-    head.add_argument("--truth", type=Path, metavar="JSON", help="write the true positions to this file")
-    _add_devices(parser)
-    parser.add_argument("--script", type=Path, metavar="FILE", help="file with commands, repeated in a loop")
-    parser.add_argument("--live", action="store_true", help="read commands from standard input")
-    return parser
-
-
-def _add_devices(parser: argparse.ArgumentParser) -> None:
-    devices = parser.add_argument_group("the devices")
-    devices.add_argument(
-        "--probe", default="ProbeToTracker", metavar="NAME", help="name of the probe; default: %(default)s"
-    )
-    devices.add_argument(
-        "--reference", metavar="NAME", help="marker on the head; without it, the head does not move"
-    )
-    devices.add_argument(
-        "--button", default="Button", metavar="NAME", help="name of the foot switch; default: %(default)s"
-    )
-    devices.add_argument(
-        "--tip",
-        type=float,
-        nargs=3,
-        default=(0.0, 0.0, -120.0),
-        metavar=("X", "Y", "Z"),
-        help="tip in the frame of the probe's marker, mm; default: 0 0 -120",
-    )
-    devices.add_argument(
-        "--noise",
-        type=float,
-        default=0.1,
-        metavar="MM",
-        help="SD of each coordinate of a marker; default: %(default)s",
-    )
-    devices.add_argument(
-        "--noise-deg",
-        type=float,
-        default=0.02,
-        metavar="DEG",
-        help="SD of its rotation about each axis; default: %(default)s",
-    )
-    devices.add_argument(
-        "--sway", type=float, default=0.0, metavar="MM", help="amplitude of head motion; default: 0"
-    )
-    devices.add_argument(
-        "--rate", type=float, default=60.0, metavar="HZ", help="messages per second; default: %(default)s"
-    )
-    devices.add_argument(
-        "--hidden",
-        choices=HIDDEN_BY,
-        default="status",
-        help="how a hidden marker is reported; default: %(default)s",
-    )
-    devices.add_argument(
-        "--messages",
-        choices=POSE_KINDS,
-        default="TRANSFORM",
-        metavar="TYPE",
-        help=f"type of the messages, of {', '.join(POSE_KINDS)}; default: TRANSFORM",
-    )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

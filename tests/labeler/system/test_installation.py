@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+from gp_labeler.cli.subcommands import SUBCOMMANDS
 from gp_labeler.system.installation import explain_import
 from gp_labeler.system.libraries import NEEDS, Need, advice, missing, packages_of
 from gp_labeler.system.qt_binding import choose_binding
+from gp_labeler.system.requirements import Requirement, requirements_of
 
 pytestmark = pytest.mark.machine
 
@@ -21,7 +24,7 @@ COMMANDS = (
     ["--demo"],
     ["--offscreen", "demo", "--output", "out"],
     ["mesh", "head.nrrd", "-o", "head.ply"],
-    ["simulate-tracker", "--help"],
+    ["simulate-tracker", "--port", "0"],
 )
 
 _BLOCK = """
@@ -173,6 +176,34 @@ def test_the_doctor_works_without_the_extra(tmp_path) -> None:
     assert done.returncode == 2
     assert "pip install" in done.stdout
     assert "Traceback" not in done.stderr + done.stdout
+
+
+def test_help_needs_no_extra_for_any_command(tmp_path) -> None:
+    outside = tuple(set(metadata.packages_distributions()) - {"gp_core", "gp_labeler", "numpy", "scipy"})
+    for command in ([], *([name] for name in SUBCOMMANDS)):
+        done = run(tmp_path, *command, "--help", blocked=outside)
+        assert (done.returncode, done.stderr) == (0, ""), command
+
+
+@pytest.mark.parametrize(
+    ("line", "needed"),
+    [
+        ("numpy>=2.1", ("numpy", ">=2.1")),
+        ("vtk>=9.7; extra == 'app'", ("vtk", ">=9.7")),
+        ('vtk >=9.7 ; extra == "app"', ("vtk", ">=9.7")),
+        ("dask[distributed]>=1; extra == 'cluster'", None),
+        ("pyside6<6.12,>=6.8.1; (python_version >= '3.10') and extra == 'app'", ("pyside6", "<6.12,>=6.8.1")),
+        ("tomli>=2; (python_version < '3.10') and extra == 'app'", None),
+        ("tomli; python_version > '3.9.1' and extra == 'app'", ("tomli", "")),
+    ],
+)
+def test_what_is_asked_for_is_read_as_packaging_reads_it(line, needed) -> None:
+    found = [(each.name, each.bounds) for each in requirements_of([line], ["app"])]
+    assert found == ([] if needed is None else [needed])
+    asked = pytest.importorskip("packaging.requirements").Requirement(line)
+    assert (needed is not None) == (not asked.marker or asked.marker.evaluate({"extra": "app"}))
+    for version in ("0.1", "2.1", "2.1.0", "6.8", "6.11.9", "6.12", "9.7.0", "9.10"):
+        assert Requirement(asked.name, str(asked.specifier)).allows(version) == (version in asked.specifier)
 
 
 def fake(folder: Path, name: str, script: str) -> None:

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gp_core.errors import GpError
+from gp_labeler.system.openigtlink import KINDS
 from gp_labeler.tracker import (
     Fault,
     LinkPhase,
@@ -21,7 +22,7 @@ from gp_labeler.tracker import (
     TrackerLink,
 )
 from gp_labeler.tracker.messages import MessageDecoder, TrackerMessage
-from gp_labeler.tracker.pose_bodies import KINDS, PoseBody, ToolPose
+from gp_labeler.tracker.pose_bodies import PoseBody, ToolPose
 from gp_labeler.tracker.sample_filter import SampleFilter
 from gp_labeler.tracker.simulated_probe import SimulatedProbe
 from gp_labeler.tracker.simulated_tracker import Simulator

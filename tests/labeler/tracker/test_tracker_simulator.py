@@ -10,10 +10,10 @@ from tracker_cases import POINTS, TIP
 
 from gp_core import Atlas, estimate_pose
 from gp_core.errors import GpError
+from gp_labeler.cli.simulate_tracker import run_simulator
 from gp_labeler.tracker import Probe, Sample
 from gp_labeler.tracker.simulated_probe import SimulatedProbe
 from gp_labeler.tracker.simulated_tracker import Simulator
-from gp_labeler.tracker.simulator import main
 
 
 def _probe(**more) -> SimulatedProbe:
@@ -61,7 +61,7 @@ def test_a_point_that_is_not_there_is_told() -> None:
     ],
 )
 def test_wrong_options_are_said_in_one_line(options, said, capsys) -> None:
-    assert main(["--port", "0", *options]) == 2
+    assert run_simulator(["--port", "0", *options]) == 2
     told = capsys.readouterr().err
     assert said in told
     assert told.count("\n") == 1
@@ -71,7 +71,7 @@ def test_the_truth_of_a_drawn_animal_is_an_animal(tmp_path, monkeypatch) -> None
     truth = tmp_path / "truth.json"
     monkeypatch.setattr("gp_labeler.tracker.simulator.serve", lambda simulator, *_: simulator.close() or 0)
     monkeypatch.setattr("gp_labeler.tracker.simulator.Simulator", _Silent)
-    assert main(["--port", "0", "--seed", "3", "--side", "R", "--truth", str(truth)]) == 0
+    assert run_simulator(["--port", "0", "--seed", "3", "--side", "R", "--truth", str(truth)]) == 0
     told = json.loads(truth.read_text(encoding="utf-8"))
     touched = {name: told["points"][name] for name in ("CL", "LLI", "MN", "OS", "RWA", "RWP")}
     found = estimate_pose(touched, told["side"], Atlas.published())

@@ -39,7 +39,7 @@ class SimulatorProcess:
         touches = folder / "touches.csv"
         rows = [f"{name},{x},{y},{z}" for name, (x, y, z) in POINTS.items()]
         touches.write_text("\n".join(["name,x,y,z", *rows]) + "\n", encoding="utf-8")
-        command = [sys.executable, "-m", "gp_labeler.tracker.simulator", "--port", "0", "--live"]
+        command = [sys.executable, "-m", "gp_labeler", "simulate-tracker", "--port", "0", "--live"]
         tip = ["--tip", *map(str, TIP)]
         self._process = subprocess.Popen(
             [*command, "--touches", str(touches), *tip, *options],

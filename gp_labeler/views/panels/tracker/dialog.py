@@ -23,8 +23,8 @@ from gp_core.errors import GpError
 from gp_core.pose.gate import PoseGate
 from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.system.openigtlink import DEFAULT_PORT
 from gp_labeler.tracker import TrackerAddress
-from gp_labeler.tracker.address import DEFAULT_PORT
 from gp_labeler.views.fonts import field_width, fit, text_width
 from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.number_field import NumberField
