@@ -73,6 +73,7 @@ def controls(root: QWidget) -> list[QWidget]:
         and (isinstance(widget, _CONTROLS) or widget.focusPolicy() != Qt.FocusPolicy.NoFocus)
         and not isinstance(widget, QHeaderView | QLabel | QScrollBar)
         and not widget.objectName().startswith("qt_")
+        and widget.metaObject().className() != "QTableCornerButton"  # qt_… only from Qt 6.11 on
     ]
 
 
