@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import sys
 
-from gp_labeler.cli.entry import main
-
 if __name__ == "__main__":
-    sys.exit(main())
+    from gp_labeler.cli.start import labeler  # imports nothing before Ctrl-C is one line
+
+    sys.exit(labeler())
+else:
+    from gp_labeler.cli.entry import main
+
+    __all__ = ["main"]

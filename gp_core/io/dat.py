@@ -21,7 +21,9 @@ __all__ = ["is_sentinel", "read_dat", "skull_feature_names"]
 
 _log = logging.getLogger(__name__)
 
-_SENTINELS_MM = np.array([[-1000.0, -1000.0, -1000.0], [0.0, 0.0, 0.0]])
+_SENTINELS_MM = np.array(
+    [[-1000.0, -1000.0, -1000.0], [1000.0, 1000.0, -1000.0], [0.0, 0.0, 0.0]]  # the second: out of a RAS file
+)
 _N_SKULL = 8
 _UNUSED = ""
 

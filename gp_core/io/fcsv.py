@@ -58,7 +58,7 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
     """
     lines = split_lines(read_text(path), path)
     heads = [line.lstrip('" ') for _, line in lines]
-    system = next((m[1].strip(' ",;') for line in heads if (m := _SYSTEM.match(line))), None)
+    system = _system(heads, path)
     body = [numbered for numbered, head in zip(lines, heads, strict=True) if not head.startswith("#")]
     first = body[0][1] if body else ""
     n_marks = first.count(";")  # as saved by a spreadsheet; a description may contain some too
@@ -75,6 +75,18 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
         for number, fields in rows
     ]
     return PointList(tuple(points), Path(path))
+
+
+def _system(heads: list[str], file: str | PathLike[str]) -> str | None:
+    """Return the coordinate system that a file names; files joined by hand may name two."""
+    named = [m[1].strip(' ",;') for line in heads if (m := _SYSTEM.match(line))]
+    if len({flips_xy(system, file) for system in named}) > 1:
+        raise FileFormatError(
+            f"names several coordinate systems: {', '.join(dict.fromkeys(named))}",
+            file=file,
+            remedy="Export each point list to a file of its own.",
+        )
+    return named[0] if named else None
 
 
 def _unpadded(fields: list[str]) -> list[str]:

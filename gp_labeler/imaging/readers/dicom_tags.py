@@ -21,6 +21,7 @@ __all__ = [
     "DicomFile",
     "DicomSlice",
     "StoredPixels",
+    "has_preamble",
     "is_dicom",
     "is_dicomdir",
     "same_pixel_size",
@@ -187,11 +188,20 @@ def same_pixel_size(one: DicomSlice, other: DicomSlice) -> bool:
     return bool(np.allclose(one.pixel, other.pixel, rtol=_SAME_SIZE))
 
 
+def has_preamble(path: Path) -> bool:
+    """Return whether a file begins with the preamble of DICOM, whatever its name says."""
+    return _head(path)[128:] == b"DICM"
+
+
 def is_dicom(path: Path) -> bool:
     """Return whether a file begins as DICOM files do, or as their data do without the preamble."""
-    with path.open("rb") as file:
-        head = file.read(132)
+    head = _head(path)
     return head[128:] == b"DICM" or _begins_bare(head)
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(132)
 
 
 def is_dicomdir(path: Path) -> bool:

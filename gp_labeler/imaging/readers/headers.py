@@ -222,7 +222,7 @@ def file_series(path: Path, said: str, listed: Sequence[str], most: int) -> list
     if re.match(r"LIST\b", said, re.IGNORECASE):
         return [beside(path, name.strip()) for name in listed[: most + 1] if name.strip()]
     match = _PATTERN.fullmatch(said)
-    if match is None:
+    if match is None or (path.parent / said).is_file():  # a name with a per cent sign in it
         return None
     given = [int(n) for n in match[2].split()]
     first, last, step = (*given[:3], *(1, most, 1)[len(given) :])

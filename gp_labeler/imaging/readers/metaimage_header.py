@@ -42,6 +42,7 @@ _TYPES = {
     "MET_FLOAT": "f4",
     "MET_DOUBLE": "f8",
 }
+_BYTE_ORDERS = ("binarydatabyteordermsb", "elementbyteordermsb")
 _ORIGINS = ("offset", "position", "origin", "imageposition")
 _MATRICES = ("transformmatrix", "rotation", "orientation")
 _MOST_AXES = 4
@@ -108,13 +109,18 @@ def _beside(path: Path, said: str) -> Path:
 
 
 def _stored(fields: dict[str, str], header_bytes: int, *, packed: bool) -> StoredVoxels:
-    code = _TYPES.get(fields["elementtype"].upper())
+    code = _TYPES.get(fields["elementtype"].upper().removesuffix("_ARRAY"))
     if code is None:
         raise VolumeError(
             f"its ElementType is {fields['elementtype']!r}, which is not read",
             remedy="Save it as whole numbers or floats.",
         )
-    big = _is_true(fields.get("binarydatabyteordermsb") or fields.get("elementbyteordermsb", ""))
+    orders = {_is_true(fields[name]) for name in _BYTE_ORDERS if fields.get(name)}
+    if len(orders) > 1 and code[1] != "1":
+        raise VolumeError(
+            "its BinaryDataByteOrderMSB and its ElementByteOrderMSB contradict each other",
+            remedy="Correct its header.",
+        )
     skip = int(numbers({"headersize": "0"} | fields, "HeaderSize", 1, whole=True)[0])
     packing = "zlib" if packed or _is_true(fields.get("compresseddata", "")) else "none"
     if not _is_true(fields.get("binarydata", "true")):
@@ -123,7 +129,7 @@ def _stored(fields: dict[str, str], header_bytes: int, *, packed: bool) -> Store
         raise VolumeError(f"its HeaderSize is {skip}", remedy="Correct its header.")
     offset = skip if skip > 0 else header_bytes
     return StoredVoxels(
-        np.dtype((">" if big else "<") + code), packing, offset, tail=0 if skip == -1 else None
+        np.dtype((">" if True in orders else "<") + code), packing, offset, tail=0 if skip == -1 else None
     )
 
 

@@ -67,6 +67,7 @@ _TO_LPS = {
     "left-anterior-superior": (1, -1, 1),
     "las": (1, -1, 1),
 }
+_SYNONYMS = {"centers": "centerings"}
 _SPATIAL = ("domain", "space", "???", "none")
 _LISTS = ("list", "time")
 _MOST_COLOURS = 4
@@ -86,7 +87,7 @@ def read_nrrd_header(path: Path, channel: int | None = None) -> Header:
         raise not_a("NRRD", path)
     end = re.search(rb"\r?\n\r?\n", head)
     text = decoded(head[: end.start() if end else len(head)])
-    fields = text_fields(text, ":")
+    fields = _with_one_spelling(text_fields(text, ":"))
     layout, axes = _layout(fields)
     files = _files(path, text, fields, layout)
     header_bytes = (end.end() if end else len(head)) if files == [path] else 0
@@ -104,6 +105,11 @@ def read_nrrd_header(path: Path, channel: int | None = None) -> Header:
         channels=1 if layout.listed else layout.channels,
         n_volumes=layout.channels if layout.listed else layout.n_volumes,
     )
+
+
+def _with_one_spelling(fields: dict[str, str]) -> dict[str, str]:
+    """Return the fields with the one name of those that Teem writes under another."""
+    return {_SYNONYMS.get(name, name): value for name, value in fields.items()}
 
 
 def _layout(fields: dict[str, str]) -> tuple[Layout, list[str | None]]:

@@ -73,15 +73,20 @@ def tiff_pixel_size(
     axis : str
         Letter of the axis that the slices run along; along times no distance is given.
     """
+    size = _described(tif, page, ome)
+    if size != UNKNOWN:
+        return replace(size, z=None) if axis == "T" else size
+    x, y = page.resolution
+    factor = {_INCH: 1.0, _CENTIMETRE: 2.54}.get(int(page.resolutionunit))
+    return UNKNOWN if factor is None else dots_per_inch(x * factor, y * factor)
+
+
+def _described(tif: tifffile.TiffFile, page: tifffile.TiffPage, ome: OmeImage | None) -> PixelSize:
+    """Return what the OME or ImageJ description says."""
     if ome is not None and (size := _ome(ome)) != UNKNOWN:
         return size
     x, y = page.resolution
-    if tif.imagej_metadata and x > 0 and y > 0:
-        size = _imagej(tif.imagej_metadata, x, y)
-        if size.x is not None:
-            return size if axis != "T" else replace(size, z=None)
-    factor = {_INCH: 1.0, _CENTIMETRE: 2.54}.get(int(page.resolutionunit))
-    return UNKNOWN if factor is None else dots_per_inch(x * factor, y * factor)
+    return _imagej(tif.imagej_metadata, x, y) if tif.imagej_metadata and x > 0 and y > 0 else UNKNOWN
 
 
 def _imagej(meta: Mapping[str, Any], x: float, y: float) -> PixelSize:

@@ -14,7 +14,7 @@ from gp_labeler.imaging.readers.added import Read, added_reader
 from gp_labeler.imaging.readers.choosing import FEW
 from gp_labeler.imaging.readers.dicom import inspect_dicom
 from gp_labeler.imaging.readers.dicom_disc import lost_files
-from gp_labeler.imaging.readers.dicom_tags import is_dicom, is_dicomdir
+from gp_labeler.imaging.readers.dicom_tags import has_preamble, is_dicom, is_dicomdir
 from gp_labeler.imaging.readers.formats import (
     DICOM_SUFFIXES,
     READABLE,
@@ -97,7 +97,7 @@ def _inspect_folder(folder: Path, options: ImportOptions, report: Report) -> Imp
     """Look into the only scan of a folder; few images beside it, such as screenshots, are named, not read."""
     files = _files(folder)
     images = _images(files)
-    others = [file for file in files if file.suffix.lower() not in SLICE_SUFFIXES]
+    others = sorted(set(files) - set(images))
     dicom = [file for file in others if is_dicom(file) and not is_dicomdir(file)]
     directory = None if dicom else next(filter(is_dicomdir, files), None)
     if directory is not None and (disc := _dicom_below(folder)):
@@ -193,7 +193,9 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _images(files: Sequence[Path]) -> list[Path]:
-    return [file for file in files if file.suffix.lower() in SLICE_SUFFIXES]
+    """Return the files that are named as images; some programs name DICOM slices so."""
+    named = (file for file in files if file.suffix.lower() in SLICE_SUFFIXES)
+    return [file for file in named if not has_preamble(file)]
 
 
 # What is built in
@@ -254,6 +256,7 @@ def _inspect_slices(path: Path, options: ImportOptions, report: Report) -> Impor
 _BUILT_IN = tuple(
     ScanReader(tuple(suffix.lstrip(".") for suffix in suffixes), knows, inspect)
     for suffixes, knows, inspect in (
+        ((), lambda path: has_preamble(path) and not is_dicomdir(path), _inspect_series),
         (tuple(VOLUME_SUFFIXES), lambda path: _itk_kind(path) is not None, _inspect_itk),
         (("dicomdir",), is_dicomdir, _inspect_disc),
         (DICOM_SUFFIXES, _is_dicom_file, _inspect_series),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,6 +18,8 @@ from gp_labeler.imaging.readers.source import Compression, Plane, RawSource, Sli
 __all__ = ["Chain", "StoredVoxels", "Whole", "length_problems", "voxels_in"]
 
 _LONGEST_LINE = 1 << 20
+_LIST_COMMA = re.compile(rb",(?=\s)")
+"""Between numbers, as Teem reads it; a decimal comma has a digit behind it."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +178,8 @@ def _typed_out(file: Path, stored: StoredVoxels, layout: Layout) -> Plane:
         if stored.packing == "hex":
             values = np.frombuffer(bytes.fromhex(text.decode("ascii")), stored.dtype)
         else:
-            values = np.array(text.split(maxsplit=n)[:n], dtype=np.float64)
+            words = _LIST_COMMA.sub(b" ", text).split(maxsplit=n)
+            values = np.array(words[:n], dtype=np.float64)
     except ValueError:
         raise VolumeError("its voxels, written as text, are not numbers", file=file) from None
     if len(values) < n:

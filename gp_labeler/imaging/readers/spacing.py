@@ -16,6 +16,8 @@ SMALLEST_MM, LARGEST_MM = 8.0, 250.0
 
 _SCREEN_DPI = (72, 90, 96, 150, 300, 600)
 _UNITS = {
+    "am": 1e-15,
+    "fm": 1e-12,
     "pm": 1e-9,
     "å": 1e-7,
     "angstrom": 1e-7,
@@ -39,12 +41,20 @@ _UNITS = {
     "dm": 100.0,
     "decimeter": 100.0,
     "decimetre": 100.0,
+    "dam": 1e4,
+    "hm": 1e5,
+    "km": 1e6,
     "m": 1000.0,
     "meter": 1000.0,
     "metre": 1000.0,
     "in": 25.4,
     "inch": 25.4,
     "inche": 25.4,  # "inches" without its s
+    "ft": 304.8,
+    "yd": 914.4,
+    "mi": 1_609_344.0,
+    "li": 25.4 / 12,
+    "pt": 25.4 / 72,
     "mil": 0.0254,
     "thou": 0.0254,
     '"': 25.4,

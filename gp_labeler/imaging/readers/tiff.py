@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -89,6 +89,7 @@ def inspect_tiff(path: Path, options: ImportOptions) -> ImportPlan:
                 *(source.shortage() if isinstance(source, RawSource) else ()),
                 *_findings(stack, path),
                 *(warning("pixel-size", text) for text in size.warnings),
+                *_calibration(tif.imagej_metadata or {}),
                 *page_problems(stack.first, options.channel),
             ),
             choices=choices if len(choices) > 1 else (),
@@ -117,6 +118,14 @@ def _findings(stack: PageStack, path: Path) -> list[Problem]:
         remedy = "Save it again, or accept copies of the neighbouring slices (--accept slice-size)."
         found.append(Problem("slice-size", text, remedy=remedy, resolved_by=("accept",)))
     return found
+
+
+def _calibration(meta: Mapping[str, Any]) -> list[Problem]:
+    """Say so where ImageJ shows other grey values than it stores: nobody else calibrates them."""
+    if "cf" not in meta or (meta["cf"], meta.get("c0", 0), meta.get("c1", 1)) == (0, 0, 1):
+        return []
+    numbers = ", ".join(f"{name}={meta[name]}" for name in ("cf", "c0", "c1", "vunit") if name in meta)
+    return [warning("calibration", f"ImageJ's calibration of its grey values ({numbers}) is not applied")]
 
 
 def _source(stack: PageStack, path: Path, tif: tifffile.TiffFile, channel: int | None) -> SliceSource:

@@ -61,6 +61,12 @@ def test_a_missing_system_is_lps_with_a_warning(file, caplog):
     assert read_landmarks(file)["CA"].tolist() == [1.5, 2, 3]
 
 
+def test_two_systems_in_one_file_are_refused(file):
+    file.write_text(f"{VERSION}# CoordinateSystem = RAS\n{row('CA')}# CoordinateSystem = 1\n{row('CB')}")
+    with pytest.raises(FileFormatError, match=r"several coordinate systems: RAS, 1\. Export each"):
+        read_landmarks(file)
+
+
 def test_slicer_3_is_ras(file):
     file.write_text(
         "# Fiducial List file /a.fcsv\n# columns = label,x,y,z,sel,vis\nCA,1.5,2,3,1,1\nCB,4,5,6,1,1\n"

@@ -67,6 +67,13 @@ def test_what_was_not_seen_is_no_touch(tmp_path: Path) -> None:
     assert touches.repeats.keys() == {"S1"}
 
 
+def test_what_was_not_seen_is_no_touch_in_a_file_of_ras(tmp_path: Path) -> None:
+    text = HEAD.replace("x,y,z", "r,a,s") + OTHERS + "MN,-10,0,1\nOI,-1000,-1000,-1000\n"
+    touches = read_touches(_write(tmp_path, text), "L")
+    assert touches["MN"].tolist() == [10, 0, 1]
+    assert "OI" in touches.unseen
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

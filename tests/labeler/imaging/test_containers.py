@@ -116,6 +116,7 @@ NRRDS: dict[str, Write] = {
         b"one line\n" + gzip.compress(PLAIN), "line skip: 1", encoding="gz"
     ),
     "text": attached(" ".join(map(str, RAW.ravel())).encode(), encoding="txt", endian=""),
+    "text, commas between": attached(" , ".join(map(str, RAW.ravel())).encode(), encoding="ascii", endian=""),
     "hex": attached(HEX, encoding="hex"),
     "byteskip": detached(b"J" * 1024 + PLAIN, "byteskip: 1024"),
     "byte skip -1": detached(b"J" * 1024 + PLAIN, "byte skip: -1"),
@@ -207,6 +208,7 @@ def test_nrrd(name: str, tmp_path: Path) -> None:
                   space_origin=""), "neither spacings nor space directions.*--spacing"),
         (attached(PLAIN, 'space units: "furlong" "furlong" "furlong"'), "unit.*'furlong'.*--spacing"),
         (attached(PLAIN, endian=""), "byte order.*endian: little, or big"),
+        (attached(" ".join(f"{v},5" for v in RAW.ravel()).encode(), encoding="txt"), "not numbers"),
         (attached(PLAIN, encoding="zrl"), "encoding is 'zrl'"),
         (attached(PLAIN, type="block"), "type is 'block'"),
         (attached(gzip.compress(PLAIN), "byte skip: -1", encoding="gzip"), "byte skip -1"),
@@ -320,6 +322,10 @@ METAS: dict[str, Write] = {
     "list": meta_of_slices("LIST\n" + "\n".join(f"my slice {n + 1:03d}.raw" for n in range(len(RAW)))),
     "pattern": meta_of_slices(f"my slice %03d.raw 1 {len(RAW)} 1"),
     "pattern alone": meta_of_slices("my slice %03d.raw"),
+    "a name like a pattern": lambda folder: (
+        written(folder / "head%20d.raw", PLAIN) and meta(local=False, ElementDataFile="head%20d.raw")(folder)
+    ),
+    "an array of one value a voxel": meta(ElementType="MET_USHORT_ARRAY"),
     "SimpleITK": itk("a.mha"),
     "SimpleITK, detached, packed": itk("a.mhd", compress=True),
 }
@@ -351,6 +357,7 @@ def test_metaimage(name: str, tmp_path: Path) -> None:
         (meta(ElementNumberOfChannels=0), "DimSize|Channels"),
         (meta(ElementNumberOfChannels=-2), "DimSize|Channels"),
         (meta(HeaderSize=-7), "HeaderSize is -7"),
+        (meta(BinaryDataByteOrderMSB="False", ElementByteOrderMSB="True"), "ByteOrderMSB contradict"),
         (meta(Kinds="domain domain list"), "sequence of 2-D images"),
         (meta(Seq_Frame0000_Timestamp="0.0"), "sequence of 2-D images"),
         (meta(local=False, ElementDataFile="../nothing.raw"), "nothing.raw, which is not there"),

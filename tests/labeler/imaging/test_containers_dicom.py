@@ -126,6 +126,17 @@ def nested(folder: Path) -> Path:
     return folder
 
 
+def named(pattern: str, given: int | None = None) -> Make:
+    """Name slices as some programs do: as if they were images, or volumes."""
+
+    def make(folder: Path) -> Path:
+        for n, data in enumerate(slices()):
+            data.save_as(folder / pattern.format(n), enforce_file_format=True)
+        return folder if given is None else folder / pattern.format(given)
+
+    return make
+
+
 def itk_frames(folder: Path) -> Path:
     image = SimpleITK.GetImageFromArray(RAW)
     image.SetSpacing(SPACING.tolist())
@@ -282,6 +293,10 @@ READ: dict[str, tuple[Make, dict[str, object]]] = {
     "disc": (disc(), {}),
     "DICOMDIR": (disc("DICOMDIR"), {}),
     "a folder for each slice": (nested, {}),
+    "named as TIFF": (named("I{:03d}.tif"), {}),
+    "named as PNG, one given": (named("I{:03d}.png", 3), {}),
+    "named as one of a pair, one given": (named("I{:03d}.img", 3), {}),
+    "named as NIfTI": (named("I{:03d}.nii"), {}),
     "frames": (one_file(), {}),
     "frames backwards": (one_file(order=range(N - 1, -1, -1)), {}),
     "frames shuffled": (one_file(order=SHUFFLED), {}),

@@ -174,6 +174,10 @@ RIGHT: dict[str, tuple[str, Writer]] = {
     "ome angstrom": ("a.ome.tif", ome_file("Å", 1e7)),
     "ome cm": ("a.ome.tif", ome_file("cm", 0.1)),
     "ome inch": ("a.ome.tif", ome_file("in", 1 / 25.4)),
+    "ome foot": ("a.ome.tif", ome_file("ft", 1 / 304.8)),
+    "ome point": ("a.ome.tif", ome_file("pt", 72 / 25.4)),
+    "ome kilometre": ("a.ome.tif", ome_file("km", 1e-6)),
+    "ome femtometre": ("a.ome.tif", ome_file("fm", 1e12)),
     "ome mixed": ("a.ome.tif", tif(ome=True, metadata=ome(X, Y * 1000, Z * 1e6, ("mm", "µm", "nm")))),
     "ome overview first": ("a.ome.tif", ome_overview_first),
     "ome pyramid": ("a.ome.tif", ome_pyramid),
@@ -376,6 +380,11 @@ ASKED: dict[str, tuple[str, Writer, str]] = {
     "imagej zunit pixel": ("a.tif", imagej("mm", 1, "zunit=pixel\nspacing=1"), "slice distance in 'pixel'"),
     "imagej no spacing": ("a.tif", imagej("mm", 1, "x=0"), "not the distance between slices"),
     "ome pixel": ("a.ome.tif", ome_file("pixel", 4), "voxel size in pixel, which is not a length"),
+    "ome film": (
+        "a.ome.tif",
+        tif(ome=True, metadata=ome(X, Y, Z) | {"axes": "TYX"}),
+        "its OME description gives pixels of .*, but not the distance",
+    ),
     "ome frame": ("a.ome.tif", ome_file("reference frame", 4), "in reference frame, which is not a length"),
     "ome z in pixels": (
         "a.ome.tif",

@@ -500,11 +500,15 @@ def test_voxels_without_a_finite_value_become_the_lowest(tmp_path: Path) -> None
     assert any("4 voxels without a finite value" in note for note in volume.notes)
 
 
+@pytest.mark.parametrize("word", ["centerings", "centers"])
 @pytest.mark.parametrize("centering", ["cell", "node", "???"])
-def test_nrrd_axes_that_say_where_they_begin_lie_where_itk_has_them(centering: str, tmp_path: Path) -> None:
+def test_nrrd_axes_that_say_where_they_begin_lie_where_itk_has_them(
+    centering: str, word: str, tmp_path: Path
+) -> None:
     path = tmp_path / "a.nrrd"
     header = {"spacings": [0.1, 0.2, 0.3], "axis mins": [-3.0, 4.0, 12.0], "centerings": [centering] * 3}
     nrrd.write(str(path), load_mouse().array[:8, :9, :10].transpose(2, 1, 0), header)
+    path.write_bytes(path.read_bytes().replace(b"centerings:", word.encode() + b":"))
     accepted = read_volume(path, accept=["extent"])
     expected = SimpleITK.ReadImage(str(path)).GetOrigin()
     np.testing.assert_allclose(accepted.T_scan_voxel[:3, 3], expected, atol=1e-12)

@@ -151,6 +151,24 @@ def test_a_damaged_numpy_is_one_line(command, tmp_path) -> None:
     refused(done, "the installation is damaged (cannot load its C library)")
 
 
+@pytest.mark.parametrize(
+    ("command", "how"),
+    [
+        ("gp-core", ["-c", "from gp_labeler.cli.start import core; core()"]),
+        ("gp-labeler", ["-c", "from gp_labeler.cli.start import labeler; labeler()"]),
+        ("gp-labeler", ["-m", "gp_labeler"]),
+    ],
+)
+def test_ctrl_c_is_one_line_while_packages_are_imported(command, how, tmp_path) -> None:
+    (tmp_path / "numpy.py").write_text(
+        "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhile True: 0"
+    )
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    told = ["env", "--default-signal=INT", sys.executable, *how]
+    done = subprocess.run(told, capture_output=True, text=True, env=env, check=False, timeout=100)
+    assert (done.returncode, done.stderr) == (130, f"{command}: stopped\n")
+
+
 def test_the_doctor_finds_nothing_wrong_where_the_tests_run(tmp_path) -> None:
     done = run(tmp_path, "doctor")
     assert done.returncode == 0, done.stdout
