@@ -14,9 +14,9 @@ from gp_core.validation import FloatArray
 from gp_labeler.autolabel.labelled_scan import LabelledScan
 from gp_labeler.autolabel.prediction import Prediction
 
-__all__ = ["LibraryCheck", "LibraryFinding", "check_predictions", "require_enough"]
+__all__ = ["FEWEST_SCANS", "LibraryCheck", "LibraryFinding", "check_predictions", "require_enough"]
 
-_FEWEST_SCANS = 3
+FEWEST_SCANS = 3
 """Two others say which of two labels that differ is wrong."""
 
 _FAR = 5.0
@@ -54,6 +54,11 @@ class LibraryFinding:
     names: tuple[str, ...]
     distance: float
     expected: float
+
+    @property
+    def concerns_all(self) -> bool:
+        """Whether all labels of the scan are wrong."""
+        return self.kind in ("other scan", "sides exchanged")
 
     @property
     def text(self) -> str:
@@ -131,7 +136,7 @@ class _Head:
 
 def require_enough(scans: Sequence[LabelledScan]) -> None:
     """Raise `GpError` where scans are too few to be checked against each other."""
-    if len(scans) < _FEWEST_SCANS:
+    if len(scans) < FEWEST_SCANS:
         raise GpError(f"three labelled scans or more are needed, got {len(scans)}")
 
 

@@ -19,6 +19,9 @@ _BONE_PERCENT = 75
 _SMOOTHING = 0.45
 """Of a voxel: the standard deviation that a voxel itself amounts to."""
 
+_FEWEST_SAMPLES = 16
+"""Along each axis: registration begins at a quarter of them, and needs four there."""
+
 
 @dataclass(frozen=True, eq=False)
 class Affine:
@@ -60,9 +63,12 @@ class SampleGrid:
 
     @classmethod
     def around(cls, low: FloatArray, high: FloatArray, step: float) -> SampleGrid:
-        """Return the grid that holds a box."""
-        nx, ny, nz = (int(n) + 1 for n in np.ceil((high - low) / step))
-        return cls(np.asarray(low, dtype=np.float64), step, (nx, ny, nz))
+        """Return the grid that holds a box, which is in its middle where it is thinner than a grid may be."""
+        size = np.ceil((high - low) / step).astype(int) + 1
+        missing = np.maximum(_FEWEST_SAMPLES - size, 0)
+        nx, ny, nz = (int(n) for n in size + missing)
+        origin = np.asarray(low, dtype=np.float64) - step * (missing // 2)
+        return cls(origin, step, (nx, ny, nz))
 
     @property
     def high(self) -> FloatArray:

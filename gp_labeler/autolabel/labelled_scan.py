@@ -16,6 +16,7 @@ from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.labels import parse_label
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.volume import Volume
 
 __all__ = ["LabelledScan", "flat_name", "flat_points", "side_and_code", "sides_of_points"]
@@ -69,14 +70,22 @@ class LabelledScan:
         """(N, 3) positions in the order of the names, LPS mm."""
         return np.array(list(self.points.values()), dtype=np.float64)
 
-    def load(self) -> Volume:
-        """Return the scan, read from its file if it is not in memory; raises `VolumeError`."""
+    def load(self, report: Report | None = None) -> Volume:
+        """Return the scan, read from its file if it is not in memory.
+
+        Raises
+        ------
+        VolumeError
+            It cannot be read.
+        Cancelled
+            The report said so.
+        """
         if self.volume is not None:
             return self.volume
         from gp_labeler.imaging.readers import read_volume  # here: not all who name scans read them
 
         assert self.path is not None
-        return read_volume(self.path, **self.options)
+        return read_volume(self.path, cancel=None if report is None else report.cancel, **self.options)
 
     def key(self, checksum: str) -> str:
         """Return 32 hex digits that change with the landmarks and the scan, not with names of files.

@@ -69,7 +69,7 @@ class TemplateLibrary:
         return {}
 
     @cached_property
-    def _held_out(self) -> dict[str, Prediction]:
+    def _held_out(self) -> dict[str, Prediction | None]:
         return {}
 
     @cached_property
@@ -129,8 +129,17 @@ class TemplateLibrary:
         """Return what the template of one labelled scan is known by; see `checksum_of`."""
         return Template.key_of(scan, self.settings, self.checksum_of(scan))
 
-    def confidence(self, registration: Registration, report: Report | None = None) -> GuessConfidence:
+    def confidence(
+        self, registration: Registration, report: Report | None = None, *, without: Sequence[str] = ()
+    ) -> GuessConfidence:
         """Predict every labelled scan from the others, and return what that says of guesses.
+
+        Parameters
+        ----------
+        registration : Registration
+        report : Report, optional
+        without : sequence of str
+            Names of specimens whose labels do not count.
 
         Raises
         ------
@@ -138,9 +147,8 @@ class TemplateLibrary:
             As `templates`.
         """
         held_out = self.held_out(registration, report)
-        return GuessConfidence(
-            [_errors(scan, held_out[scan.name]) for scan in self.scans if scan.name in held_out]
-        )
+        counted = [scan for scan in self.scans if scan.name in held_out and scan.name not in without]
+        return GuessConfidence([_errors(scan, held_out[scan.name].without(without)) for scan in counted])
 
     def held_out(self, registration: Registration, report: Report | None = None) -> dict[str, Prediction]:
         """Return for each labelled scan where the others expect its landmarks.
@@ -153,7 +161,7 @@ class TemplateLibrary:
         for n, scan in enumerate(self.scans):
             work(n / len(self.scans))
             self.held_out_of(scan, registration, work.part(n / len(self.scans), (n + 1) / len(self.scans)))
-        return dict(self._held_out)
+        return {name: found for name, found in self._held_out.items() if found is not None}
 
     def held_out_of(
         self, scan: LabelledScan, registration: Registration, report: Report | None = None
@@ -163,6 +171,7 @@ class TemplateLibrary:
             try:
                 self._held_out[scan.name] = self._prediction(scan, registration, report or Report())
             except HeadNotFoundError as error:
+                self._held_out[scan.name] = None
                 _log.warning("%s: %s", scan.name, error.problem)
         return self._held_out.get(scan.name)
 
@@ -172,6 +181,10 @@ class TemplateLibrary:
 
     def _prediction(self, scan: LabelledScan, registration: Registration, report: Report) -> Prediction:
         others = self.templates(without=[scan.name])
+        earlier = {other.name: self._kept(scan, other, registration) for other in others}
+        kept = {name: carried for name, carried in earlier.items() if carried is not None}
+        if len(kept) == len(others) <= self.most:
+            return Prediction(kept, None)  # no scan is read again
 
         def known(template: Template) -> Carried | None:
             return self._kept(scan, template, registration)
@@ -180,7 +193,7 @@ class TemplateLibrary:
             self._keep(scan, template, registration, carried)
 
         return predict(  # without its labels, of which one may be wrong
-            scan.load(),
+            scan.load(report),
             others,
             registration,
             self.settings,
@@ -193,7 +206,7 @@ class TemplateLibrary:
     def _template(self, scan: LabelledScan, report: Report) -> Template:
         checksum, loaded = self._known_checksum(scan), scan
         if checksum is None:
-            loaded = replace(scan, volume=scan.load())
+            loaded = replace(scan, volume=scan.load(report))
             checksum = self._keep_checksum(loaded)
         if self.folder is None:
             return Template.of(loaded, self.settings, report)

@@ -32,6 +32,7 @@ __all__ = [
     "UNCERTAIN",
     "FoundPose",
     "converged",
+    "determines_pose",
     "find_pose",
     "pose_from_points",
     "refine_pose",
@@ -55,6 +56,9 @@ _APART_DEG, _RIVAL_DEG = 18.0, 25.0
 _TRIED, _FINER = 32, 5
 _MOST_ROUNDS, _STILL_DEG = 4, 0.5
 _MARGIN = 0.6
+
+_LEAST_WIDTH = 0.05
+"""How far points must lie from their longest line, over the radius of the head."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +229,7 @@ def pose_from_points(
     """
     (report or Report()).check()
     n = len(here)
-    if n < 3 or min(_width(here), _width(there)) < 0.05 * known.radius:
+    if not (determines_pose(here, known) and determines_pose(there, known)):
         raise GpError(
             "the points do not determine the orientation of the head",
             remedy="Place three that are far apart, not on a line.",
@@ -235,9 +239,12 @@ def pose_from_points(
     return converged(min(found, key=lambda pose: pose.score), known)
 
 
-def _width(points: FloatArray) -> float:
-    """Return how far points (N, 3) lie from their longest line, mm; 0 on a line."""
-    return float(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1])
+def determines_pose(points: FloatArray, known: HeadSurface) -> bool:
+    """Return whether points (N, 3), mm, say how a known head lies: three or more, and not on a line."""
+    if len(points) < 3:
+        return False
+    width = float(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1])
+    return width >= _LEAST_WIDTH * known.radius
 
 
 def _starts(bone: Bone, known: HeadSurface, report: Report) -> list[Similarity]:

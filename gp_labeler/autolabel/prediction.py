@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -13,12 +13,20 @@ import numpy as np
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.confidence import centre_of, spread_of
-from gp_labeler.autolabel.pose_search import FoundPose, converged, find_pose, pose_from_points, refine_pose
+from gp_labeler.autolabel.pose_search import (
+    UNCERTAIN,
+    FoundPose,
+    converged,
+    determines_pose,
+    find_pose,
+    pose_from_points,
+    refine_pose,
+)
 from gp_labeler.autolabel.registration import Registration
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.template import Template
 from gp_labeler.autolabel.transfer import TargetScan, carry
-from gp_labeler.head_pose.surface_fit import SCALES_OF_A_SPECIES, Similarity, fit_similarity
+from gp_labeler.head_pose.surface_fit import SCALES_OF_A_SPECIES, fit_similarity
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.volume import Volume
 
@@ -26,6 +34,9 @@ __all__ = ["Carried", "HeadNotFoundError", "Prediction", "predict"]
 
 _TRIED_TEMPLATES = 3
 _POSE_SHARE = 0.15
+
+_WORSE = 0.08
+"""A template's bone does not fit where its score is so much worse than that of the one posed first."""
 
 Carried = Mapping[str, FloatArray]
 """Landmarks carried by one template: positions (3,) by name, LPS mm in the target."""
@@ -49,7 +60,7 @@ class Prediction:
     Parameters
     ----------
     carried : mapping of str to mapping of str to (3,) array
-        By template, then by landmark, LPS mm.
+        By template, then by landmark, LPS mm; nothing of a template whose bone does not fit the scan.
     pose : FoundPose
         Of the best template.
     scores : mapping of str to float
@@ -64,6 +75,21 @@ class Prediction:
     def names(self) -> tuple[str, ...]:
         """Landmarks that any template has, in the order of the first that has them."""
         return tuple(dict.fromkeys(name for carried in self.carried.values() for name in carried))
+
+    @property
+    def templates(self) -> tuple[str, ...]:
+        """Names of the templates that say something, the most similar first."""
+        return tuple(name for name, carried in self.carried.items() if carried)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the templates whose bone does not fit the scan."""
+        return tuple(name for name, carried in self.carried.items() if not carried)
+
+    def without(self, templates: Collection[str]) -> Prediction:
+        """Return what the other templates say."""
+        carried = {name: points for name, points in self.carried.items() if name not in templates}
+        return replace(self, carried=carried)
 
     def of(self, name: str) -> FloatArray:
         """Return where the templates expect one landmark, (k, 3)."""
@@ -106,7 +132,8 @@ def predict(
     most : int
         Of more templates than so many, those are taken whose bone lies on the scan's best.
     known, keep : callable, optional
-        Return what a template carried earlier, or None; receive what it carries now.
+        Return what a template carried earlier, or None; receive what it carries now, nothing where its bone
+        does not fit the scan.
     report : Report, optional
 
     Returns
@@ -125,18 +152,12 @@ def predict(
     if not templates:
         raise GpError("no labelled scan was given")
     report = report or Report()
-    if len(templates) <= most:
-        earlier = {template.name: known(template) for template in templates}
-        if all(carried is not None for carried in earlier.values()):
-            return Prediction(
-                {name: carried for name, carried in earlier.items() if carried is not None}, None
-            )
     base, pose = _pose(volume, templates, placed or {}, report.part(0.0, _POSE_SHARE))
     poses = {base.name: pose}
     for other in templates:
         report.check()
         if other is not base:
-            poses[other.name] = _pose_of(other, base, pose, volume)
+            poses[other.name] = _pose_of(other, base, pose, volume, report.part(_POSE_SHARE, _POSE_SHARE))
     chosen = sorted(templates, key=lambda template: poses[template.name].score)[:most]
     target = TargetScan(volume, pose.bone.threshold, min(t.image.grid.step for t in chosen))
     carried: dict[str, Carried] = {}
@@ -144,8 +165,9 @@ def predict(
         part = report.part(*(_POSE_SHARE + (1 - _POSE_SHARE) * (n + i) / len(chosen) for i in (0, 1)))
         found = known(template)
         if found is None:
-            fit = converged(poses[template.name], template.surface).fit
-            found = carry(template, target, fit, registration, settings, part)
+            own = poses[template.name]
+            fit = converged(own, template.surface).fit
+            found = carry(template, target, fit, registration, settings, part) if _fits(own, pose) else {}
             keep(template, found)
         carried[template.name] = found
     return Prediction(carried, pose, {template.name: poses[template.name].score for template in chosen})
@@ -172,12 +194,22 @@ def _pose(
     return best
 
 
-def _pose_of(other: Template, base: Template, pose: FoundPose, volume: Volume) -> FoundPose:
-    """Return the pose of another template, by the landmarks that it shares with the one that was posed."""
+def _pose_of(other: Template, base: Template, pose: FoundPose, volume: Volume, report: Report) -> FoundPose:
+    """Return the pose of another template, by the landmarks that it shares with the one that was posed.
+
+    Where they do not determine it, or are wrong in one of the two, it is found by its bone.
+    """
     shared = tuple(name for name in other.points if name in base.points)
-    if len(shared) < 3:
-        return find_pose(volume, other.surface)
-    weights = np.full(len(shared), 1 / len(shared))
-    between = fit_similarity(other.array(shared), base.array(shared), weights, SCALES_OF_A_SPECIES)
-    start: Similarity = pose.fit.after(between)
-    return refine_pose(pose.bone, other.surface, start)
+    there, here = other.array(shared), base.array(shared)
+    if determines_pose(there, other.surface) and determines_pose(here, base.surface):
+        weights = np.full(len(shared), 1 / len(shared))
+        between = fit_similarity(there, here, weights, SCALES_OF_A_SPECIES)
+        found = refine_pose(pose.bone, other.surface, pose.fit.after(between))
+        if _fits(found, pose):
+            return found
+    return find_pose(volume, other.surface, report)
+
+
+def _fits(found: FoundPose, base: FoundPose) -> bool:
+    """Return whether a template's bone fits a scan, about as well as that of the template posed first."""
+    return found.score <= max(UNCERTAIN, base.score + _WORSE)

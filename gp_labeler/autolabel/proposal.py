@@ -13,7 +13,7 @@ from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.labelled_scan import side_and_code
 
-__all__ = ["Guess", "Proposal", "most_doubtful_first"]
+__all__ = ["Guess", "Proposal", "most_doubtful_first", "scans_text"]
 
 _DOUBTFUL = 2.0
 """A guess is doubtful from the start where its radius is so many times the median radius."""
@@ -112,8 +112,7 @@ class Proposal:
     @property
     def source(self) -> str:
         """What suggests, in words: ``5 labelled scans``."""
-        n = len(self.templates)
-        return "1 labelled scan" if n == 1 else f"{n} labelled scans"
+        return scans_text(len(self.templates))
 
     def suggestion(self, guess: Guess) -> Suggestion:
         """Return a guess as a suggestion for a person to confirm."""
@@ -140,6 +139,11 @@ class Proposal:
             "left": self.left,
             "warnings": list(self.warnings),
         }
+
+
+def scans_text(n: int) -> str:
+    """Return a number of labelled scans in words: ``1 labelled scan``."""
+    return "1 labelled scan" if n == 1 else f"{n} labelled scans"
 
 
 def most_doubtful_first(guesses: Sequence[Guess]) -> tuple[Guess, ...]:

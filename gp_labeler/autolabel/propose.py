@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.atlas_agreement import compare_with_atlas, disagreement_text
 from gp_labeler.autolabel.confidence import GuessConfidence
+from gp_labeler.autolabel.cross_check import FEWEST_SCANS, check_predictions
 from gp_labeler.autolabel.library import TemplateLibrary
 from gp_labeler.autolabel.pose_search import ACCEPTED
 from gp_labeler.autolabel.prediction import Prediction, predict
@@ -30,6 +31,35 @@ Stored = Literal["as it is", "mirrored"]
 _MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 _HISTORY_SHARE = 0.6
 _FEWEST_PLACED = 3
+
+
+@dataclass(frozen=True)
+class _Contradicted:
+    """Labelled scans that the others contradict.
+
+    Parameters
+    ----------
+    wholly : tuple of str
+        Names of those whose labels cannot be used; fewer than half of all.
+    partly : tuple of str
+        Names of those with some labels to look at.
+    """
+
+    wholly: tuple[str, ...] = ()
+    partly: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, library: TemplateLibrary, registration: Registration, report: Report) -> _Contradicted:
+        """Predict every labelled scan from the others, and compare; two scans alone say nothing."""
+        predictions = library.held_out(registration, report)
+        if len(library.scans) < FEWEST_SCANS:
+            return cls()
+        found = check_predictions(library.scans, predictions).findings
+        named = tuple(dict.fromkeys(finding.specimen for finding in found))
+        wholly = tuple(dict.fromkeys(finding.specimen for finding in found if finding.concerns_all))
+        if 2 * len(wholly) >= len(library.scans):
+            wholly = ()
+        return cls(wholly, tuple(name for name in named if name not in wholly))
 
 
 def propose(
@@ -82,9 +112,10 @@ def propose(
     registration = registration or HereRegistration(engine_named())
     report = Report(progress, cancel)
     first = _HISTORY_SHARE if with_history else 0.1
-    confidence = GuessConfidence(())
+    confidence, contradicted = GuessConfidence(()), _Contradicted()
     if with_history:
-        confidence = library.confidence(registration, report.part(0.0, first))
+        contradicted = _Contradicted.of(library, registration, report.part(0.0, first))
+        confidence = library.confidence(registration, without=contradicted.wholly)
     checksum = volume.find_checksum(report.part(first, first))
     own = [scan.name for scan in library.scans if library.checksum_of(scan) == checksum]
     if len(own) == len(library.scans):
@@ -95,7 +126,7 @@ def propose(
         known = {name: _mirrored(xyz) for name, xyz in known.items()}
     prediction = predict(
         scan,
-        library.templates(report.part(first, first), without=own),
+        library.templates(report.part(first, first), without=[*own, *contradicted.wholly]),
         registration,
         library.settings,
         placed=known,
@@ -113,11 +144,14 @@ def propose(
         most_doubtful_first(guesses),
         prediction.names,
         tuple(outside),
-        tuple(prediction.carried),
+        prediction.templates,
         score,
         registration.name,
         _LEFT[stored],
-        tuple(_warnings(guesses, confidence, registration, stored, uncertain)),
+        (
+            *_warnings(guesses, confidence, registration, stored, uncertain),
+            *_warnings_of_scans(contradicted, prediction.left_out),
+        ),
     )
 
 
@@ -163,6 +197,18 @@ def _warnings(
         yield disagreement
     if stored is None:
         yield _LEFT[stored]
+
+
+def _warnings_of_scans(contradicted: _Contradicted, left_out: Sequence[str]) -> Iterator[str]:
+    """Yield which labelled scans a person should look at."""
+    if contradicted.wholly:
+        named = ", ".join(contradicted.wholly)
+        yield f"not used, since the other labelled scans contradict their labels: {named}"
+    if contradicted.partly:
+        named = ", ".join(contradicted.partly)
+        yield f"check the labels of {named}: the other labelled scans contradict some of them"
+    if left_out:
+        yield f"not used, since their bone does not fit this scan: {', '.join(left_out)}"
 
 
 _LEFT = {

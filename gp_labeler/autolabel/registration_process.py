@@ -39,10 +39,21 @@ class HereRegistration:
         iterations: str,
         cancel: Callable[[], bool] | None = None,
     ) -> Field:
-        """Return the displacements; see `gp_labeler.autolabel.registration.RegisterImages`."""
+        """Return the displacements; see `gp_labeler.autolabel.registration.RegisterImages`.
+
+        Raises
+        ------
+        Cancelled
+            `cancel` says so, before it begins.
+        GpError
+            The registration failed.
+        """
         if cancel is not None and cancel():
             raise Cancelled
-        return ENGINES[self.name](fixed, moving, step, iterations)
+        try:
+            return ENGINES[self.name](fixed, moving, step, iterations)
+        except (ImportError, RuntimeError) as error:
+            raise _failed(_in_words(error)) from error
 
 
 class ProcessRegistration:
@@ -95,7 +106,7 @@ class ProcessRegistration:
                 "the registration process ended unexpectedly", remedy="Free some memory, and try again."
             ) from None
         if isinstance(found, str):
-            raise GpError(f"the registration failed ({found})")
+            raise _failed(found)
         return np.asarray(found, dtype=np.float32)
 
     def close(self) -> None:
@@ -139,4 +150,12 @@ def _serve(connection: Connection, name: str) -> None:
         try:
             connection.send(ENGINES[name](fixed, moving, step, iterations))
         except Exception as error:  # whatever a library raises is told, in words
-            connection.send(f"{type(error).__name__}: {error}")
+            connection.send(_in_words(error))
+
+
+def _in_words(error: Exception) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def _failed(why: str) -> GpError:
+    return GpError(f"the registration failed ({why})")

@@ -32,7 +32,7 @@ class Settings:
     reach: float = 0.8
     margin: float = 0.15
     fewest: int = 3
-    iterations: str = "60x40x15"
+    iterations: str = "60x40x8"
     fine_iterations: str = "60x40x15 0x0x15"
 
     @property

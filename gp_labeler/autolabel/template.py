@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gp_core.disk import atomic_file
-from gp_core.errors import FileFormatError
+from gp_core.errors import FileFormatError, GpError
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.grey_image import Affine, GreyImage, SampleGrid, sampled, smoothed_for
 from gp_labeler.autolabel.head_surface import HeadSurface
@@ -93,8 +93,9 @@ class Template:
             The report said so.
         """
         settings, report = settings or Settings(), report or Report()
-        volume = scan.load()
+        volume = scan.load(report)
         report.check()
+        _require_inside(scan, volume)
         bone = _bone_of(volume)
         report.check()
         whole_step = max(bone.radius / settings.whole, *volume.spacing)
@@ -193,6 +194,18 @@ def part_of(volume: Volume, step: float, box: FloatArray | None = None) -> Coars
         The box holds none of the scan.
     """
     return smoothed_for(coarse_scan(volume, _FINER_THAN_STEP * step, box), step)
+
+
+def _require_inside(scan: LabelledScan, volume: Volume) -> None:
+    """Raise `GpError` where most landmarks lie outside their scan."""
+    outside = int((~volume.contains(scan.array)).sum())
+    if 2 * outside > len(scan.points):
+        raise GpError(
+            f"{outside} of its {len(scan.points)} landmarks lie outside its scan",
+            file=scan.path,
+            specimen=scan.name,
+            remedy="Check that they belong to this scan, and are given in its coordinates.",
+        )
 
 
 def _bone_of(volume: Volume) -> Bone:

@@ -190,15 +190,18 @@ def _placed(files: Sequence[Path]) -> Mapping[str, Any]:
 
 def _tell(result: HeadResult) -> None:
     """Say what became of one head."""
+    from gp_labeler.autolabel.proposal import scans_text  # here: `--help` need not wait
+
     if result.problem:
-        sys.stderr.write(f"gp-labeler: {result.path.name}: {result.problem}\n")
+        names_it = result.path.name in result.problem
+        sys.stderr.write(f"gp-labeler: {'' if names_it else f'{result.path.name}: '}{result.problem}\n")
         return
     about = result.proposal
     doubtful = [guess["name"] for guess in about["guesses"] if guess["doubtful"]]
     written = "kept from an earlier run" if result.is_earlier else ", ".join(f.name for f in result.files)
     sys.stdout.write(
-        f"{result.path.name}: {len(about['guesses'])} suggestions from {len(about['templates'])} labelled "
-        f"scans{_radii(about['guesses'])}; {written}\n"
+        f"{result.path.name}: {len(about['guesses'])} suggestions from {scans_text(len(about['templates']))}"
+        f"{_radii(about['guesses'])}; {written}\n"
     )
     if doubtful:
         sys.stdout.write(f"{result.path.name}: look closely at {' '.join(doubtful)}\n")

@@ -4,6 +4,7 @@ import json
 import os
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,9 +17,12 @@ from gp_core.io import load_specimens, read_points
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
 from gp_labeler.autolabel import HeadNotFoundError, LabelledScan, TemplateLibrary, propose
+from gp_labeler.autolabel.grey_image import SampleGrid
 from gp_labeler.autolabel.labelled_scan import side_and_code
 from gp_labeler.autolabel.pose_search import FoundPose, converged, find_pose, pose_from_points, refine_pose
+from gp_labeler.autolabel.prediction import Prediction, predict
 from gp_labeler.autolabel.registration import engine_named, register_demons, register_greedy
+from gp_labeler.autolabel.registration_process import HereRegistration
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.suggestion_files import write_proposal
 from gp_labeler.autolabel.template import Template
@@ -128,6 +132,95 @@ def test_a_pose_is_refined_until_it_stays():
     once = refine_pose(found.bone, known, begun)  # which ends before it has arrived
     assert angle_deg(once.fit.rotation, found.fit.rotation) > 1.0
     assert (again.score, again.rival, again.seen) == (found.score, found.rival, found.seen)
+
+
+class PoseAlone:
+    """A registration that leaves everything where the pose puts it."""
+
+    name = "none"
+
+    def register(self, fixed, moving, step, iterations, cancel=None):
+        return np.zeros((*fixed.shape, 3), np.float32)
+
+
+def with_names_moved_on(scan):
+    """Return a labelled scan in which each label bears the name of the next one."""
+    places = list(scan.points.values())
+    return replace(scan, points=dict(zip(scan.points, [*places[1:], places[0]], strict=True)))
+
+
+def bar():
+    """Return a labelled scan of a bar of bone: no head."""
+    grey = np.zeros((20, 24, 60), np.float32)
+    grey[8:12, 8:15, 8:52] = 1000
+    points = {name: np.array([5.0 * n + 8, 8.0 + n % 3, 10.0]) for n, name in enumerate(FEATURES)}
+    return LabelledScan("bar", points, volume=Volume.from_parts(grey, [0.9] * 3))
+
+
+def test_a_labelled_scan_with_wrong_labels_is_posed_by_its_bone_and_one_without_a_head_is_left_out():
+    volume, truth = small_head(7, turn=TURN)
+    three = {name: truth[name] for name in ("CA_L", "OI_L", "ZL_R")}  # for a quick pose of the first one
+    given = [Template.of(scan) for scan in (labelled(0), with_names_moved_on(labelled(1)), bar())]
+    found = predict(volume, given, PoseAlone(), Settings(), placed=three)
+    assert (set(found.templates), found.left_out) == ({"small-0", "small-1"}, ("bar",))
+    right = predict(volume, [Template.of(labelled(1))], PoseAlone(), Settings(), placed=three)
+    off = [
+        np.linalg.norm(found.carried["small-1"][name] - right.carried["small-1"][its_name])
+        for name, its_name in pairwise(FEATURES)
+    ]
+    assert max(off) < 1.0
+
+
+class LibraryPredictedExactly(TemplateLibrary):
+    """A library in which each head is predicted where its landmarks truly are."""
+
+    def held_out(self, registration, report=None):
+        rng = np.random.default_rng(0)
+        return {
+            scan.name: Prediction(
+                {
+                    str(k): {name: xyz + rng.normal(0, 0.1, 3) for name, xyz in truth.items()}
+                    for k in range(3)
+                },
+                None,
+            )
+            for scan, truth in zip(self.scans, [small_head(seed)[1] for seed in range(4)], strict=True)
+        }
+
+
+def test_labels_that_the_other_scans_contradict_are_not_suggested_from():
+    scans = [labelled(0), with_names_moved_on(labelled(1)), labelled(2), labelled(3)]
+    found = propose(small_head(7, turn=TURN)[0], LibraryPredictedExactly(scans), registration=PoseAlone())
+    assert set(found.templates) == {"small-0", "small-2", "small-3"}
+    (told,) = [warning for warning in found.warnings if "small-1" in warning]
+    assert "contradict" in told
+    assert max(guess.history for guess in found.guesses) < 0.3  # its errors say nothing of the others
+
+
+def test_landmarks_outside_their_scan_are_refused_with_the_specimen():
+    scan = labelled(0)
+    far = replace(scan, points={name: xyz + 300 for name, xyz in scan.points.items()})
+    with pytest.raises(GpError, match=r"small-0: 8 of its 8 landmarks lie outside its scan\."):
+        TemplateLibrary([far]).templates()
+
+
+def test_a_thin_box_has_a_grid_that_can_be_registered():
+    low, high = np.array([0.0, 10.0, -3.0]), np.array([30.0, 10.2, -3.0])
+    grid = SampleGrid.around(low, high, 1.0)
+    assert grid.size == (31, 16, 16)
+    assert np.abs((grid.origin + grid.high - low - high) / 2).max() <= 0.5
+    pytest.importorskip("picsl_greedy")
+    rng = np.random.default_rng(0)
+    fixed, moving = rng.normal(size=(2, *grid.size[::-1])).astype(np.float32)
+    assert HereRegistration("greedy").register(fixed, moving, 1.0, "2x2x2").shape == (*fixed.shape, 3)
+
+
+def test_what_the_registration_cannot_do_is_said_in_one_line():
+    pytest.importorskip("picsl_greedy")
+    tiny = np.zeros((3, 3, 3), np.float32)
+    with pytest.raises(GpError, match=r"^the registration failed \(RuntimeError: ") as caught:
+        HereRegistration("greedy").register(tiny, tiny, 1.0, "2x2x2")
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
