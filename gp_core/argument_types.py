@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import functools
 import inspect
+import itertools
 import numbers
 import types
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -95,32 +96,27 @@ def checks_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def _checking(function: Callable[_P, _R], leaving_out: Collection[str]) -> Callable[_P, _R]:
     signature = inspect.signature(function)
     names = tuple(name for name, one in signature.parameters.items() if one.kind in _BY_PLACE)
-    hints: dict[str, Any] = {}
+    tests: dict[str, _Type] = {}
 
     @functools.wraps(function)
     def checked(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        if not hints:
-            hints.update(typing.get_type_hints(function))
-            for name in leaving_out:
-                hints.pop(name, None)
-        if not _all_fit(names, args, kwargs, hints):
-            for name, value in _named(signature, args, kwargs).items():
-                if name in hints and signature.parameters[name].default is not value:
-                    _check(value, hints[name], name)
+        if not tests:
+            hints = typing.get_type_hints(function)
+            tests.update((name, _type_of(hint)) for name, hint in hints.items() if name not in leaving_out)
+        for values in (zip(names, args, strict=False), kwargs.items()):
+            for name, value in values:  # without binding them, which takes longer than many functions
+                if name in tests and not tests[name].fits(value):
+                    _raise_for(_named(signature, args, kwargs), signature, tests)
         return function(*args, **kwargs)
 
     return checked
 
 
-def _all_fit(
-    names: tuple[str, ...], args: tuple[Any, ...], kwargs: Mapping[str, Any], hints: Mapping[str, Any]
-) -> bool:
-    """Whether all arguments fit, seen without binding them, which takes longer than many functions."""
-    return (
-        len(args) <= len(names)
-        and all(_fits(value, hints.get(name, Any)) for name, value in zip(names, args, strict=False))
-        and all(_fits(value, hints.get(name, Any)) for name, value in kwargs.items())
-    )
+def _raise_for(values: Mapping[str, Any], signature: inspect.Signature, tests: Mapping[str, _Type]) -> None:
+    """Raise `GpError` for the first argument of a wrong type; a default is right even where it is not."""
+    for name, value in values.items():
+        if name in tests and signature.parameters[name].default is not value:
+            tests[name].check(value, name)
 
 
 def _named(
@@ -142,58 +138,83 @@ def check_fields(instance: Any, *, leaving_out: Collection[str] = ()) -> None:
     leaving_out : collection of str
         Fields that take more than they are annotated with, and say so themselves.
     """
-    hints = _hints_of(instance.__class__)
+    types_of_fields = _fields_of(instance.__class__)
     for one in fields(instance):
         if one.name not in leaving_out:
-            _check(getattr(instance, one.name), hints[one.name], one.name)
+            types_of_fields[one.name].check(getattr(instance, one.name), one.name)
 
 
 @functools.cache
-def _hints_of(cls: Any) -> dict[str, Any]:
-    return typing.get_type_hints(cls)
+def _fields_of(cls: Any) -> dict[str, _Type]:
+    return {name: _type_of(hint) for name, hint in typing.get_type_hints(cls).items()}
 
 
-def _check(value: Any, hint: Any, name: str) -> None:
-    if not _fits(value, hint):
-        shown = repr(value)
-        if len(shown) > 60 or "\n" in shown:
-            shown = type(value).__name__
-        raise GpError(f"{name} must be {_words(hint)}, got {shown}")
+@dataclass(frozen=True)
+class _Type:
+    """An annotated type, made once so that values are tested quickly.
+
+    Parameters
+    ----------
+    hint : type or alias
+        As annotated.
+    exact : frozenset of type
+        Classes whose instances fit without further tests.
+    test : callable
+        Whether any other value fits.
+    """
+
+    hint: Any
+    exact: frozenset[type]
+    test: Callable[[Any], bool]
+
+    def fits(self, value: Any) -> bool:
+        """Whether a value is of the type."""
+        return type(value) in self.exact or self.test(value)
+
+    def check(self, value: Any, name: str) -> None:
+        """Raise `GpError`, with the name of the argument, unless the value is of the type."""
+        if not self.fits(value):
+            shown = repr(value)
+            if len(shown) > 60 or "\n" in shown:
+                shown = type(value).__name__
+            raise GpError(f"{name} must be {_words(self.hint)}, got {shown}")
 
 
-def _fits(value: Any, hint: Any) -> bool:
-    """Whether a value is of an annotated type; what is not understood fits."""
-    if type(value) is hint and hint is not int:  # as usual; a whole number may be too large
-        return True
-    anything, origin, arguments = _parts(hint)
-    if anything:
-        return True
+@functools.cache
+def _type_of(hint: Any) -> _Type:
+    """Return the tests of an annotation; where it is not understood, everything fits."""
+    meant = _meant(hint)
+    origin, arguments = typing.get_origin(meant), typing.get_args(meant)
+    if meant is Any or _takes_arrays(meant):
+        return _Type(hint, frozenset(), _anything)
     if origin in _UNIONS:
-        return any(_fits(value, one) for one in arguments)
+        members = [_type_of(one) for one in arguments]
+        together = frozenset(each for one in members for each in one.exact)
+        return _Type(hint, together, lambda value: any(one.test(value) for one in members))
     if origin is None:
-        return _fits_class(value, hint)
+        is_plain = isinstance(meant, type) and meant is not int  # a whole number may be too large
+        return _Type(hint, frozenset([meant] if is_plain else []), functools.partial(_fits_class, hint=meant))
+    return _Type(hint, frozenset(), _test_of(origin, arguments))
+
+
+def _test_of(origin: Any, arguments: tuple[Any, ...]) -> Callable[[Any], bool]:
+    """Return the test of a generic alias such as ``list[float]``: its origin is list."""
     if origin is np.ndarray:
-        return _is_numeric(value)
+        return _is_numeric
+    if not isinstance(origin, type):
+        return _anything
     if origin is tuple and arguments[-1] is not Ellipsis:
-        return (
-            isinstance(value, Sequence) and len(value) == len(arguments) and all(map(_fits, value, arguments))
-        )
-    if isinstance(origin, type) and issubclass(origin, Mapping):
-        keys, values = arguments
-        return isinstance(value, Mapping) and all(
-            _fits(key, keys) and (_fits(one, values)) for key, one in value.items()
-        )
-    if isinstance(origin, type) and issubclass(origin, Iterable) and arguments:
-        return _fits_iterable(value, origin, arguments[0])
-    return not isinstance(origin, type) or isinstance(value, origin)
+        return functools.partial(_fits_tuple, members=[_type_of(one) for one in arguments])
+    if issubclass(origin, Mapping):
+        keys, values = map(_type_of, arguments)
+        return functools.partial(_fits_mapping, keys=keys, values=values)
+    if issubclass(origin, Iterable) and arguments:
+        return functools.partial(_fits_iterable, origin=origin, element=_type_of(arguments[0]))
+    return lambda value: isinstance(value, origin)
 
 
-@functools.cache
-def _parts(hint: Any) -> tuple[bool, Any, tuple[Any, ...]]:
-    """Return whether anything fits, and what an annotation is made of."""
-    hint = _meant(hint)
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    return hint is Any or _takes_arrays(hint), origin, arguments
+def _anything(_: Any) -> bool:
+    return True
 
 
 def _meant(hint: Any) -> Any:
@@ -221,14 +242,28 @@ def _fits_class(value: Any, hint: Any) -> bool:
     return isinstance(value, hint)
 
 
-def _fits_iterable(value: Any, origin: type, element: Any) -> bool:
+def _fits_tuple(value: Any, members: Sequence[_Type]) -> bool:
+    return (
+        isinstance(value, Sequence)
+        and len(value) == len(members)
+        and all(member.fits(one) for member, one in zip(members, value, strict=True))
+    )
+
+
+def _fits_mapping(value: Any, keys: _Type, values: _Type) -> bool:
+    return isinstance(value, Mapping) and all(
+        keys.fits(key) and values.fits(one) for key, one in value.items()
+    )
+
+
+def _fits_iterable(value: Any, origin: type, element: _Type) -> bool:
     """Whether it may be gone through, and holds what it should; a text is no list of letters."""
     if isinstance(value, str | bytes) or not isinstance(value, Iterable) or is_scalar_array(value):
         return False
     if issubclass(origin, Sequence) and not isinstance(value, Sequence):
         return False
     if isinstance(value, Collection):
-        return all(_fits(one, element) for _, one in zip(range(_MANY), value, strict=False))
+        return all(element.fits(one) for one in itertools.islice(value, _MANY))
     return True  # a generator, which can be gone through but once
 
 
@@ -260,6 +295,8 @@ def _is_number(value: Any, kind: type) -> bool:
 
 
 def _is_numeric(value: Any) -> bool:
+    if type(value) is np.ndarray and value.dtype.kind in "fiu":
+        return True
     try:
         np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
