@@ -29,7 +29,7 @@ _EXAMPLE = """examples:
   gp-labeler straighten head.nrrd --json pose.json
   gp-labeler straighten head.nrrd --landmarks GP-014_L.mrk.json GP-014_R.mrk.json
   gp-labeler straighten head.nrrd --midline 1 -40 2 --left 12 0 5 --right -11 1 5
-  gp-labeler straighten two-heads.nrrd --box -20 -60 -20 20 10 20
+  gp-labeler straighten two-heads.nrrd --near 21 -15 4
 
 The scan is not changed. Left and right are those of the file; a scan cannot prove them.
 """
@@ -48,6 +48,13 @@ def make_straighten_parser() -> argparse.ArgumentParser:
     parser.add_argument("--threshold", type=float, metavar="T", help="bone threshold, grey value")
     parser.add_argument(
         "--box", type=float, nargs=6, metavar="MM", help="search only this box: x y z of two corners, LPS"
+    )
+    parser.add_argument(
+        "--near",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="in a scan of several heads, a point in the one that is meant, LPS mm",
     )
     points = parser.add_argument_group("from points, if the symmetry of the bone is not sufficient")
     points.add_argument(
@@ -106,8 +113,9 @@ def _check_points(args: argparse.Namespace) -> None:
         raise GpError(f"--midline, --left and --right belong together, got --{' and --'.join(given)} alone")
     if given and args.landmarks:
         raise GpError("give --landmarks, or --midline, --left and --right, not both")
-    if args.box is not None and (given or args.landmarks):
-        raise GpError("--box is for straightening without points")
+    for name in ("box", "near"):
+        if getattr(args, name) is not None and (given or args.landmarks):
+            raise GpError(f"--{name} is for straightening without points")
     if args.threshold is not None and not np.isfinite(args.threshold):
         raise GpError(f"--threshold must be a number, got {args.threshold}")
 
@@ -122,7 +130,7 @@ def _pose(volume: Volume, args: argparse.Namespace) -> HeadPose:
         )
     if not args.landmarks:
         box = None if args.box is None else np.sort(np.reshape(args.box, (2, 3)), axis=0)
-        return straighten(volume, threshold=args.threshold, box=box)
+        return straighten(volume, threshold=args.threshold, box=box, near=args.near)
     specimens = load_specimens(args.landmarks)
     if len(specimens) != 1:
         raise GpError(f"--landmarks must be of one animal, got {', '.join(s.name for s in specimens)}")

@@ -2,7 +2,7 @@
 
 from gp_labeler.head_pose.by_points import straighten_by_landmarks, straighten_by_points
 from gp_labeler.head_pose.mid_plane import MidPlane
-from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError
+from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError, SeveralHeadsError
 from gp_labeler.head_pose.straighten import straighten
 from gp_labeler.head_pose.template import HeadTemplate
 
@@ -12,6 +12,7 @@ __all__ = [
     "HeadPoseError",
     "HeadTemplate",
     "MidPlane",
+    "SeveralHeadsError",
     "straighten",
     "straighten_by_landmarks",
     "straighten_by_points",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
+from gp_labeler.head_pose.distance_field import DistanceField
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 
@@ -36,6 +38,12 @@ COARSER = 1.5
 
 _N_POINTS = 4000
 _SMALLEST_ISLAND = 0.05
+_MOST_ISLANDS, _RIVAL_SHARE = 6, 0.2
+"""Islands that are looked at by themselves, at most, and their size over that of the largest, at least."""
+
+_ALIKE, _APART_RADII = 0.4, 0.8
+"""Two heads: the smaller one over the larger one, and their distance over both radii, at least."""
+
 _FEWEST_VOXELS = 500
 _TAILS_PERCENT = (0.5, 99.9)
 _SAMPLES = 500_000
@@ -86,9 +94,8 @@ class CoarseScan:
         found: FloatArray = points @ self.T_index_scan[:3, :3].T + self.T_index_scan[:3, 3]
         return found
 
-    def places(self, mask: _Mask) -> FloatArray:
-        """Return the centres (N, 3) of the voxels of a mask, LPS mm."""
-        index = np.argwhere(mask)[:, ::-1]
+    def places(self, index: NDArray[Any]) -> FloatArray:
+        """Return the centres (N, 3) of voxels (N, 3) named by i, j, k, LPS mm."""
         return np.asarray(index @ self.T_scan_index[:3, :3].T + self.T_scan_index[:3, 3])
 
     def inside(self, points: FloatArray) -> _Mask:
@@ -113,7 +120,7 @@ class CoarseScan:
 def finest_step(volume: Volume) -> float:
     """Return the edge of the cubes, mm, that are fine enough for the pose of a head that fills the scan."""
     extent = np.sort(np.array(volume.size) * volume.spacing)
-    return max(float(extent[1]) / _VOXELS_ACROSS, max(volume.spacing))
+    return float(extent[1]) / _VOXELS_ACROSS
 
 
 def coarse_scan(volume: Volume, step: float, box: ArrayLike | None = None) -> CoarseScan:
@@ -123,7 +130,7 @@ def coarse_scan(volume: Volume, step: float, box: ArrayLike | None = None) -> Co
     ----------
     volume : Volume
     step : float
-        mm; never finer than the voxels.
+        mm; along a longer edge of the voxels, the voxels stay as they are.
     box : (2, 3) array_like, LPS mm, optional
 
     Raises
@@ -257,9 +264,27 @@ class Bone:
         large = np.argsort(-sizes)[: np.count_nonzero(sizes >= _SMALLEST_ISLAND * max(int(sizes.max()), 1))]
         if sizes[large].sum() < _FEWEST_VOXELS:
             raise GpError(f"there is almost no bone above {threshold:g}", remedy="Move the threshold.")
-        together = cls(scan, threshold, np.isin(numbers, large))
-        rivals = [i for i in large[:3] if sizes[i] >= 0.2 * sizes[large[0]]]
+        is_large = np.isin(np.arange(n + 1), large)
+        together = cls(scan, threshold, is_large[numbers])
+        rivals = [i for i in large[:_MOST_ISLANDS] if sizes[i] >= _RIVAL_SHARE * sizes[large[0]]]
         return [together, *(cls(scan, threshold, numbers == i) for i in rivals if len(large) > 1)]
+
+    def is_apart_from(self, other: Bone) -> bool:
+        """Whether a bone is about as large as another one, and lies beside it, not around or under it."""
+        sizes = sorted((len(self.index), len(other.index)))
+        distance = float(np.linalg.norm(self.centre - other.centre))
+        return sizes[0] >= _ALIKE * sizes[1] and distance > _APART_RADII * (self.radius + other.radius)
+
+    def with_what_is_near(self, everything: Bone, others: Sequence[Bone]) -> Bone:
+        """Return the bone with what belongs to neither it nor others, but lies nearest to it."""
+        rest = everything.mask & ~np.any([bone.mask for bone in (self, *others)], axis=0)
+        index = indices_of(rest)
+        places = everything.scan.places(index)
+        away = [np.linalg.norm(places - bone.centre, axis=1) for bone in (self, *others)]
+        i, j, k = index[np.argmin(away, axis=0) == 0].T
+        mask = self.mask.copy()
+        mask[k, j, i] = True
+        return Bone(self.scan, self.threshold, mask)
 
     @cached_property
     def surface(self) -> _Mask:
@@ -271,9 +296,9 @@ class Bone:
     @cached_property
     def points(self) -> FloatArray:
         """(N, 3) LPS mm: some of the surface, in random order, the same each time."""
-        places = self.scan.places(self.surface)
-        order = np.random.default_rng(0).permutation(len(places))[:_N_POINTS]
-        return places[order]
+        index = indices_of(self.surface)
+        order = np.random.default_rng(0).permutation(len(index))[:_N_POINTS]
+        return self.scan.places(index[order])
 
     @cached_property
     def tree(self) -> Any:
@@ -282,21 +307,37 @@ class Bone:
 
         return cKDTree(self.points)
 
+    @cached_property
+    def distances(self) -> DistanceField:
+        """How far places are from its surface."""
+        return DistanceField.of(self)
+
     def inside(self, points: FloatArray) -> _Mask:
         """Return which points (N, 3), LPS mm, lie where the scanner measured."""
         return self.scan.inside(points)
 
     @cached_property
+    def index(self) -> NDArray[np.intp]:
+        """(N, 3) i, j, k of its voxels."""
+        return indices_of(self.mask)
+
+    @cached_property
     def centre(self) -> FloatArray:
         """(3,) LPS mm: the centroid."""
-        centroid: FloatArray = self.scan.places(self.mask).mean(axis=0)
+        centroid: FloatArray = self.scan.places(self.index.mean(axis=0)[None])[0]
         return centroid
 
     @cached_property
     def radius(self) -> float:
         """Root mean square distance from the centroid, mm."""
-        offsets = self.scan.places(self.mask) - self.centre
-        return float(np.sqrt((offsets**2).sum(axis=1).mean()))
+        axes = self.scan.T_scan_index[:3, :3]
+        return float(np.sqrt(np.trace(axes @ np.cov(self.index.T, bias=True) @ axes.T)))
+
+
+def indices_of(mask: _Mask) -> NDArray[np.intp]:
+    """Return i, j, k (N, 3) of the voxels of a mask."""
+    k, j, i = np.unravel_index(np.flatnonzero(mask), mask.shape)
+    return np.stack([i, j, k], axis=1)
 
 
 def bone_of(volume: Volume, threshold: float | None = None) -> tuple[Bone, Bone]:

@@ -10,14 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.bone import Bone
+from gp_labeler.head_pose.distance_field import CLIP
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.imaging.progress import Report
 
-__all__ = ["Agreement", "agreement_of", "clipped_distances", "refined_by_points", "search_planes"]
+__all__ = ["Agreement", "agreement_of", "refined_by_points", "search_planes"]
 
 _N_NORMALS, _N_POINTS = 320, 1200
 _N_LIKELY, _N_FEW_POINTS = 90, 300
@@ -26,8 +26,6 @@ _N_LIKELY, _N_FEW_POINTS = 90, 300
 _REACH, _STEP = 0.6, 0.45
 """How far from the centroid planes are tried (in radii), and how densely (in clipping distances)."""
 
-_CLIP, _OUTSIDE = 6.0, -0.3
-"""Distances are clipped at radius / 6; a point beyond the scan scores neither well nor badly."""
 
 _APART_DEG = 12.0
 _KEPT, _FINER = 14, 6
@@ -64,7 +62,7 @@ def agreement_of(bone: Bone, plane: MidPlane) -> Agreement:
 def search_planes(bone: Bone, report: Report) -> list[MidPlane]:
     """Return distinct planes in which a bone may be symmetric, the best first."""
     starts = _scored_on_grid(bone, report.part(0.0, 0.6))
-    clip = bone.radius / _CLIP
+    clip = bone.radius / CLIP
     found = []
     for n, start in enumerate(starts):
         report(0.6 + 0.3 * n / len(starts))
@@ -87,50 +85,27 @@ def distinct(planes: list[MidPlane], apart_deg: float) -> list[MidPlane]:
     return kept
 
 
-def clipped_distances(bone: Bone, clip: float) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
-    """Return distances to the surface, less `clip`, at most 0: a flat padded grid, and its size (x, y, z)."""
-    from scipy.ndimage import distance_transform_edt
-
-    distance = distance_transform_edt(~bone.surface, sampling=bone.scan.spacing[::-1])
-    below: NDArray[np.float32] = np.minimum(distance - clip, 0.0).astype(np.float32)
-    if bone.scan.measured is not None:
-        below[~bone.scan.measured] = _OUTSIDE * clip
-    padded = np.pad(below, 1, constant_values=_OUTSIDE * clip)
-    return padded.ravel(), np.array(padded.shape[::-1], dtype=np.intp)
-
-
 def _scored_on_grid(bone: Bone, report: Report) -> list[MidPlane]:
-    clip = bone.radius / _CLIP
-    field = clipped_distances(bone, clip)
-    offsets = np.arange(-_REACH * bone.radius, _REACH * bone.radius + 1e-9, _STEP * clip)
+    offsets = np.arange(-_REACH, _REACH + 1e-9, _STEP / CLIP) * bone.radius
     normals = _hemisphere(_N_NORMALS)
-    first = [_best_offset(bone, normal, offsets, field, _N_FEW_POINTS)[0] for normal in normals]
+    first = [_best_offset(bone, normal, offsets, _N_FEW_POINTS)[0] for normal in normals]
     report(0.4)
     scored = []
     for n in np.argsort(first)[:_N_LIKELY]:
-        score, offset = _best_offset(bone, normals[n], offsets, field, _N_POINTS)
+        score, offset = _best_offset(bone, normals[n], offsets, _N_POINTS)
         scored.append((score, MidPlane.through(bone.centre + offset * normals[n], normals[n])))
     report(1.0)
     scored.sort(key=lambda pair: pair[0])
     return distinct([plane for _, plane in scored], _APART_DEG)[:_KEPT]
 
 
-def _best_offset(
-    bone: Bone,
-    normal: FloatArray,
-    offsets: FloatArray,
-    distances: tuple[NDArray[np.float32], NDArray[np.intp]],
-    n_points: int,
-) -> tuple[float, float]:
+def _best_offset(bone: Bone, normal: FloatArray, offsets: FloatArray, n_points: int) -> tuple[float, float]:
     """Return the least mean distance of mirror images in planes of one normal, and the plane's offset."""
-    field, size = distances
+    field = bone.distances
     points = bone.points[:n_points]
-    index = bone.scan.indices(points) + 1.0
     heights = (points - bone.centre) @ normal
-    step = bone.scan.T_index_scan[:3, :3] @ normal
-    at = np.rint(index - 2 * (heights - offsets[:, None])[..., None] * step).astype(np.intp)
-    i, j, k = np.moveaxis(np.clip(at, 0, size - 1), -1, 0)
-    score = field[(k * size[1] + j) * size[0] + i].mean(axis=1)
+    step = field.T_index_scan[:3, :3] @ normal
+    score = field.means(field.indices(points) - 2 * (heights - offsets[:, None])[..., None] * step)
     best = int(score.argmin())
     return float(score[best]), float(offsets[best])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,9 +10,10 @@ import numpy as np
 
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
+from gp_core.validation import FloatArray
 from gp_labeler.head_pose.mid_plane import MidPlane
 
-__all__ = ["Confidence", "HeadPose", "HeadPoseError"]
+__all__ = ["Confidence", "HeadPose", "HeadPoseError", "SeveralHeadsError"]
 
 _REMEDY = "Place IN and a pair such as OI, and straighten by landmarks; or give a box around the head."
 
@@ -21,6 +23,25 @@ class HeadPoseError(GpError):
 
     def __init__(self, reason: str, *, file: Any = None, remedy: str = _REMEDY) -> None:
         super().__init__(reason, file=file, remedy=remedy)
+
+
+class SeveralHeadsError(HeadPoseError):
+    """The scan contains several heads, and nobody has said which one is meant.
+
+    Parameters
+    ----------
+    centres : sequence of (3,) array, LPS mm
+        The middle of each head's bone.
+    """
+
+    def __init__(self, centres: Sequence[FloatArray], *, file: Any = None) -> None:
+        places = "; ".join(" ".join(f"{x:.1f}" for x in centre) for centre in centres)
+        super().__init__(
+            f"the scan contains {len(centres)} heads, at {places} mm (LPS)",
+            file=file,
+            remedy="Say which one is meant: give a point in it, or a box around it.",
+        )
+        self.centres = tuple(centres)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +24,7 @@ from gp_labeler.head_pose.bone import (
 from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import Agreement, agreement_of, search_planes
-from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError
+from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError, SeveralHeadsError
 from gp_labeler.head_pose.template import HeadTemplate, InPlane, front_and_up, phantom_template
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.volume import Volume
@@ -77,6 +77,7 @@ def straighten(
     *,
     threshold: float | None = None,
     box: ArrayLike | None = None,
+    near: ArrayLike | None = None,
     template: HeadTemplate | None = None,
     progress: Progress | None = None,
     cancel: Callable[[], bool] | None = None,
@@ -90,6 +91,8 @@ def straighten(
         Grey value at which bone begins; by default two candidates are tried.
     box : (2, 3) array_like, LPS mm, optional
         Look at this part of the scan only: without a holder, a second head.
+    near : (3,) array_like, LPS mm, optional
+        A point in the head that is meant, in a scan of several.
     template : HeadTemplate, optional
         A known head that says which way is front and up, and the pitch; by default the synthetic guinea pig.
     progress, cancel : callable, optional
@@ -103,6 +106,8 @@ def straighten(
     ------
     HeadPoseError
         No plane was found that can be trusted; the message says why and asks for points.
+    SeveralHeadsError
+        The scan contains several heads, and `near` does not say which one is meant.
     GpError
         There is no bone, no contrast, or nothing in the box.
     Cancelled
@@ -113,7 +118,9 @@ def straighten(
     step = finest_step(volume)
     fine = coarse_scan(volume, step, box)
     coarse = coarse_scan(volume, COARSER * step, box)
-    found = _mid_plane(fine, coarse, threshold, volume, report.part(0.05, 0.7))
+    coarse = fine if coarse.grid.shape == fine.grid.shape else coarse  # as large: one is enough
+    meant = None if near is None else np.asarray(near, dtype=np.float64).reshape(3)
+    found = _mid_plane(fine, coarse, threshold, meant, volume, report.part(0.05, 0.7))
     return pose_in_plane(
         volume,
         found.bone,
@@ -125,7 +132,12 @@ def straighten(
 
 
 def _mid_plane(
-    fine: CoarseScan, coarse: CoarseScan, threshold: float | None, volume: Volume, report: Report
+    fine: CoarseScan,
+    coarse: CoarseScan,
+    threshold: float | None,
+    meant: FloatArray | None,
+    volume: Volume,
+    report: Report,
 ) -> _Found:
     """Return the first plane that can be trusted, over thresholds and islands of bone."""
     levels = _levels(coarse) if threshold is None else (threshold,)
@@ -133,19 +145,67 @@ def _mid_plane(
     problem: GpError | None = None
     for level in levels:
         try:
-            bones = Bone.islands(coarse, level)
+            islands = _Islands.above(level, fine, coarse)
         except GpError as error:
             problem = error
             continue
-        fine_islands = cache(partial(Bone.islands, fine, level))
-        for bone in bones:
-            found = _best_plane(bone, fine_islands, report)
+        heads = _separate_heads(islands, report)
+        if heads:
+            return _meant_head(heads, meant, islands, volume, report)
+        for bone in islands.searched:
+            found = _best_plane(bone, islands, report)
             tried.append(found)
             if found.accepted:
                 return found
     if not tried:
         raise problem or GpError("there is no bone", file=volume.path)
     raise HeadPoseError(_why(max(tried, key=lambda f: f.confidence.agreement)), file=volume.path)
+
+
+@dataclass(frozen=True, eq=False)
+class _Islands:
+    """Bone above one threshold, in the copy of the scan that is searched, and in the one for the last fit."""
+
+    searched: list[Bone]
+    fine: CoarseScan
+    level: float
+
+    @classmethod
+    def above(cls, level: float, fine: CoarseScan, coarse: CoarseScan) -> _Islands:
+        return cls(Bone.islands(coarse, level), fine, level)
+
+    @cached_property
+    def _refined(self) -> list[Bone]:
+        is_same_copy = self.searched[0].scan is self.fine
+        return self.searched if is_same_copy else Bone.islands(self.fine, self.level)
+
+    def counterpart(self, bone: Bone) -> Bone:
+        """Return the bone of the finer copy that is the same island."""
+
+        def unlike(other: Bone) -> float:
+            return float(np.linalg.norm(other.centre - bone.centre)) + abs(other.radius - bone.radius)
+
+        return min(self._refined, key=unlike)
+
+
+def _separate_heads(islands: _Islands, report: Report) -> list[_Found]:
+    """Return the mid-plane of each head in a scan of several; nothing where there is one at most."""
+    rivals = islands.searched[1:]
+    apart = [b for b in rivals if any(b.is_apart_from(other) for other in rivals if other is not b)]
+    heads = [found for found in (_best_plane(b, islands, report) for b in apart) if found.accepted]
+    return heads if len(heads) > 1 else []
+
+
+def _meant_head(
+    heads: list[_Found], meant: FloatArray | None, islands: _Islands, volume: Volume, report: Report
+) -> _Found:
+    """Return the head that a point lies nearest to, with its jaw and what else lies near."""
+    if meant is None:
+        raise SeveralHeadsError([head.bone.centre for head in heads], file=volume.path)
+    own = min(heads, key=lambda head: float(np.linalg.norm(head.bone.centre - meant)))
+    others = [head.bone for head in heads if head is not own]
+    found = _best_plane(own.bone.with_what_is_near(islands.searched[0], others), islands, report)
+    return found if found.accepted else own
 
 
 def _levels(scan: CoarseScan) -> tuple[float, ...]:
@@ -155,7 +215,7 @@ def _levels(scan: CoarseScan) -> tuple[float, ...]:
     return levels if further is None else (*levels, further)
 
 
-def _best_plane(bone: Bone, fine_islands: Callable[[], list[Bone]], report: Report) -> _Found:
+def _best_plane(bone: Bone, islands: _Islands, report: Report) -> _Found:
     """Return the plane in which the two halves agree best, and its lead over the others.
 
     Most of the time goes into the fit of grey values, so it is spent only on planes that may be accepted: a
@@ -166,7 +226,7 @@ def _best_plane(bone: Bone, fine_islands: Callable[[], list[Bone]], report: Repo
     found = _leading(bone, judged)
     if found.is_hopeless(_GAIN):
         return found
-    values = GreyValues(_counterpart(bone, fine_islands()))
+    values = GreyValues(islands.counterpart(bone))
     least = found.confidence.agreement - _GAIN
     for n, (agreement, plane) in enumerate(judged):
         report(0.6 + 0.3 * n / len(judged))
@@ -180,14 +240,6 @@ def _best_plane(bone: Bone, fine_islands: Callable[[], list[Bone]], report: Repo
     others = [pair for pair in judged if pair[1] is not found.plane]
     plane = refined_by_grey_values(values, found.plane)
     return _leading(bone, [(agreement_of(bone, plane), plane), *others])
-
-
-def _counterpart(bone: Bone, others: list[Bone]) -> Bone:
-    """Return the bone of the finer copy that is the same island."""
-    return min(
-        others,
-        key=lambda other: float(np.linalg.norm(other.centre - bone.centre)) + abs(other.radius - bone.radius),
-    )
 
 
 def _leading(bone: Bone, judged: list[tuple[Agreement, MidPlane]]) -> _Found:
@@ -238,7 +290,7 @@ def pose_in_plane(
 def _dense_in_front(bone: Bone, lying: InPlane) -> bool:
     """Whether the densest bone, the teeth, lies in front of the middle of all bone."""
     values = bone.scan.grid[bone.mask]
-    places = bone.scan.places(bone.mask)
+    places = bone.scan.places(bone.index)
     densest = places[values >= np.quantile(values, 0.985)]
     forward: FloatArray = -lying.axes[:, 1]
     return float((densest.mean(axis=0) - places.mean(axis=0)) @ forward) > 0

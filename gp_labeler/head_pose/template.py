@@ -13,7 +13,6 @@ from gp_core.frames import RigidTransform
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.bone import Bone, bone_of
 from gp_labeler.head_pose.mid_plane import MidPlane
-from gp_labeler.head_pose.mirror_search import clipped_distances
 from gp_labeler.head_pose.surface_fit import (
     SCALES_OF_A_SPECIES,
     Similarity,
@@ -31,7 +30,7 @@ _TURN_STEP_DEG = 15.0
 _SHIFTS = np.arange(-0.6, 0.61, 0.12)
 _KEPT, _FINER = 8, 3
 _APART_DEG = 25.0
-_CLIP_SEARCH, _CLIP_FIT = 6.0, 8.0
+_CLIP_FIT = 8.0
 _SAME_SPECIES = (0.6, 1.67)
 """Ratios of two radii that a cropped scan explains: the sizes of the heads themselves may be alike."""
 
@@ -165,19 +164,17 @@ _Start = tuple[float, Similarity]
 
 def _starts(bone: Bone, plane: MidPlane, template: HeadTemplate, scale: float) -> list[_Start]:
     """Return turns of the template in the plane, each with its best shift and its clipped distance."""
-    field, size = clipped_distances(bone, bone.radius / _CLIP_SEARCH)
+    field = bone.distances
     middle = template.points.mean(axis=0) * (0.0, 1.0, 1.0)
     points = scale * (template.points[:_N_COARSE] - middle)
     first, second = np.linalg.svd(plane.normal[None])[2][1:]
     centre = plane.nearest(bone.centre)
     shifts = np.array([centre + bone.radius * (a * first + b * second) for a in _SHIFTS for b in _SHIFTS])
-    at_shift = bone.scan.indices(shifts) + 1.0
+    at_shift = field.indices(shifts)
     scored = []
     for rotation in _turns(plane, first, second):
-        offsets = points @ rotation.T @ bone.scan.T_index_scan[:3, :3].T
-        index = np.rint(offsets[None] + at_shift[:, None]).astype(np.intp)
-        i, j, k = np.moveaxis(np.clip(index, 0, size - 1), -1, 0)
-        score = field[(k * size[1] + j) * size[0] + i].mean(axis=1)
+        offsets = points @ rotation.T @ field.T_index_scan[:3, :3].T
+        score = field.means(offsets[None] + at_shift[:, None])
         best = int(score.argmin())
         scored.append(
             (float(score[best]), Similarity(scale, rotation, shifts[best] - scale * rotation @ middle))

@@ -22,10 +22,11 @@ _MODULES = ("scipy.ndimage", "scipy.optimize", "scipy.spatial", "SimpleITK", "gp
 
 @dataclass(frozen=True, eq=False)
 class Straighten:
-    """Find the head by the symmetry of its bone."""
+    """Find the head by the symmetry of its bone: of several, the one that a point lies in."""
 
     volume: Volume
     threshold: float | None = None
+    near: tuple[float, float, float] | None = None
 
     @property
     def title(self) -> str:
@@ -37,7 +38,13 @@ class Straighten:
         load_modules(*_MODULES)
         from gp_labeler.head_pose import straighten
 
-        return straighten(self.volume, threshold=self.threshold, progress=progress, cancel=progress.cancelled)
+        return straighten(
+            self.volume,
+            threshold=self.threshold,
+            near=self.near,
+            progress=progress,
+            cancel=progress.cancelled,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from gp_labeler.document.head_frame import HeadFrame
 from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import Position
-from gp_labeler.head_pose import HeadPose
+from gp_labeler.head_pose import HeadPose, SeveralHeadsError
 from gp_labeler.imaging.anatomical_frame import letter_of
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.head import Straighten, StraightenByLandmarks, StraightenByPoints
@@ -57,7 +57,7 @@ class HeadModel:
     """
 
     changed = Signal()
-    """The head frame, what is running, the free points, or why the last attempt was refused."""
+    """The head frame, what is running, the free points, the heads to choose from, or the last refusal."""
 
     def __init__(
         self,
@@ -74,6 +74,8 @@ class HeadModel:
         """File and order of slices of a scan that shall be straightened once it is open."""
         self.refusal = ""
         """Why the last attempt found nothing, and what to do; empty where it did."""
+        self.heads: tuple[Position, ...] = ()
+        """Of a scan of several heads, a point in each, mm, until one was chosen; else nothing."""
         document.reset.connect(self._on_reset)
         document.head_frame_changed.connect(self.changed.emit)
         document.landmarks_changed.connect(self._on_landmarks)
@@ -108,6 +110,13 @@ class HeadModel:
     def points(self) -> Mapping[str, Position]:
         """The free points marked so far, scan mm."""
         return MappingProxyType(self._points)
+
+    @property
+    def head_names(self) -> tuple[str, ...]:
+        """What each of several heads is called, such as ``Head 1 (towards R)`` of the scan."""
+        middle = np.mean(self.heads, axis=0)
+        letters = [letter_of(np.subtract(position, middle)) for position in self.heads]
+        return tuple(f"Head {n} (towards {letter})" for n, letter in enumerate(letters, 1))
 
     @property
     def left_text(self) -> str:
@@ -155,9 +164,23 @@ class HeadModel:
 
     # Straightening
 
-    def straighten(self) -> None:
-        """Find the head by the symmetry of its bone, in the background."""
-        self._submit(Straighten(self._volume(), self._document.state.threshold))
+    def straighten(self, near: ArrayLike | None = None) -> None:
+        """Find the head by the symmetry of its bone, in the background.
+
+        Parameters
+        ----------
+        near : (3,) array_like, LPS mm, optional
+            In a scan of several heads, a point in the one that is meant: the crosshair goes there, too.
+
+        Raises
+        ------
+        GpError
+            There is no scan, or `near` is no position.
+        """
+        point = None if near is None else as_position(near, "near")
+        if point is not None:
+            self._view.set_crosshair(point)
+        self._submit(Straighten(self._volume(), self._document.state.threshold, point))
 
     def straighten_by_landmarks(self) -> None:
         """Find the head by the landmarks of both sides: IN and a pair, or two pairs."""
@@ -332,7 +355,7 @@ class HeadModel:
         return reversed_by_hand or (self.frame is not None and self.frame.left_confirmed)
 
     def _submit(self, job: Job[HeadPose]) -> None:
-        self.refusal = ""
+        self.refusal, self.heads = "", ()
         self._jobs.submit(job, self.take, key=_KEY)
 
     def _take_by_hand(self, axes: FloatArray, origin: FloatArray, *, merge: bool) -> None:
@@ -344,7 +367,7 @@ class HeadModel:
 
     def _on_reset(self) -> None:
         self._points.clear()
-        self.refusal = ""
+        self.refusal, self.heads = "", ()
         self.changed.emit()
 
     def _on_opened(self, volume: Volume) -> None:
@@ -366,6 +389,9 @@ class HeadModel:
             self.changed.emit()
 
     def _on_failed(self, task: Task[Any]) -> None:
-        if task.key == _KEY:
-            self.refusal = task.message
-            self.changed.emit()
+        if task.key != _KEY:
+            return
+        self.refusal = task.message
+        if isinstance(task.error, SeveralHeadsError):
+            self.heads = tuple(as_position(centre, "head") for centre in task.error.centres)
+        self.changed.emit()

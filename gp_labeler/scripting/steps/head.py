@@ -26,6 +26,8 @@ class StraightenHead(Step):
         ``symmetry`` of the bone, placed ``landmarks`` of both sides, or three ``points``.
     midline, left, right : three numbers, optional
         The points, scan mm: one of the midline, and the same place on both sides.
+    near : three numbers, optional
+        In a scan of several heads, a point in the one that is meant, scan mm; for ``symmetry``.
     left_confirmed : bool
         Whether left is known to be left as the file says; nothing in a scan can prove it.
     """
@@ -36,6 +38,7 @@ class StraightenHead(Step):
     midline: Triple | None = None
     left: Triple | None = None
     right: Triple | None = None
+    near: Triple | None = None
     left_confirmed: bool = False
 
     def __post_init__(self) -> None:
@@ -47,12 +50,14 @@ class StraightenHead(Step):
             raise GpError("straighten: by = 'points' needs midline, left and right")
         if self.by != "points" and given:
             raise GpError(f"straighten: {given[0]} is for by = 'points'")
+        if self.by != "symmetry" and self.near is not None:
+            raise GpError("straighten: near is for by = 'symmetry'")
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         head = driver.workspace.head
         before = head.frame
         if self.by == "symmetry":
-            head.straighten()
+            head.straighten(self.near)
         elif self.by == "landmarks":
             head.straighten_by_landmarks()
         else:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -17,11 +18,13 @@ from gp_labeler.head_pose import (
     HeadPoseError,
     HeadTemplate,
     MidPlane,
+    SeveralHeadsError,
     straighten,
     straighten_by_landmarks,
     straighten_by_points,
 )
-from gp_labeler.head_pose.bone import bone_of, coarse_scan, threshold_above
+from gp_labeler.head_pose.bone import bone_of, coarse_scan, indices_of, threshold_above
+from gp_labeler.head_pose.distance_field import DistanceField
 from gp_labeler.head_pose.template import front_and_up
 from gp_labeler.imaging.progress import Cancelled, Report
 from gp_labeler.imaging.readers import read_volume
@@ -131,6 +134,44 @@ def test_a_box_leaves_out_what_is_not_the_head():
     assert errors(pose, phantom)[0] < 0.6
     with pytest.raises(GpError, match="box contains no part of the scan"):
         straighten(phantom.volume, box=[[900, 900, 900], [950, 950, 950]])
+
+
+def two_heads():
+    """Return a scan of a head with a second one like it beside it, and how far away that is."""
+    volume = head(names=USUAL).volume
+    away = volume.T_scan_voxel[:3, 0] * volume.array.shape[2]
+    return Volume(np.concatenate([volume.array] * 2, axis=2), volume.T_scan_voxel), away
+
+
+def test_of_two_heads_none_is_chosen_until_somebody_says_which_one_is_meant():
+    scan, away = two_heads()
+    with pytest.raises(SeveralHeadsError, match=r"contains 2 heads, at .*point in it, or a box") as refused:
+        straighten(scan)
+    first, second = sorted(refused.value.centres, key=lambda centre: float(centre @ away))
+    np.testing.assert_allclose(second - first, away, atol=0.5)
+    pose, truth = straighten(scan, near=second + 3.0), true_plane(head(names=USUAL))
+    assert pose.mid_plane.angle_to_deg(truth) < 0.5
+    height = np.sign(pose.mid_plane.normal @ truth.normal) * pose.mid_plane.heights(second[None])[0]
+    assert height == pytest.approx(truth.heights((second - away)[None])[0], abs=0.15)
+    np.testing.assert_allclose(pose.T_head_scan.rotation, found().T_head_scan.rotation, atol=0.05)
+
+
+def test_a_point_in_the_only_head_changes_nothing():
+    near = straighten(head(names=USUAL).volume, near=[5.0, 5.0, 5.0])
+    np.testing.assert_allclose(near.T_head_scan.matrix, found().T_head_scan.matrix)
+
+
+def test_the_field_of_distances_says_how_far_bone_is():
+    bone = bone_of(head(names=USUAL).volume)[0]
+    field, clip = DistanceField.of(bone), bone.radius / 6
+    rng = np.random.default_rng(3)
+    points = bone.centre + rng.uniform(-1, 1, (400, 3)) * bone.radius
+    true = np.minimum(cKDTree(bone.scan.places(indices_of(bone.surface))).query(points)[0] - clip, 0)
+    inside = bone.inside(points)
+    cell = 1 / np.linalg.norm(field.T_index_scan[:3, :3], axis=1).min()
+    told = np.array([field.means(field.indices(p[None])[None])[0] for p in points])
+    assert abs(told - true)[inside].max() < 1.8 * cell
+    assert abs((told - true)[inside].mean()) < 0.5 * cell
 
 
 @pytest.mark.parametrize(
@@ -277,7 +318,7 @@ def test_cubes_of_a_long_voxel_are_means_at_the_right_place():
     scan = coarse_scan(volume, 0.4)
     assert scan.grid.shape == (4, 3, 2)
     np.testing.assert_allclose(scan.grid[1, 2, 1], values[1, 4:6, 4:8].mean())
-    at = scan.places(np.ones(scan.grid.shape, bool))[0]
+    at = scan.places(np.zeros((1, 3)))[0]
     np.testing.assert_allclose(at, volume.voxel_to_scan([[1.5, 0.5, 0.0]])[0])
     np.testing.assert_allclose(scan.sampled(scan.grid, at[None]), scan.grid[0, 0, 0])
 

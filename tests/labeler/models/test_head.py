@@ -14,7 +14,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.head_edits import SetHeadFrame
 from gp_labeler.document.specimen_file import read_specimen
 from gp_labeler.document.specimen_json import document_of, state_of
-from gp_labeler.head_pose import Confidence, HeadPose, HeadPoseError
+from gp_labeler.head_pose import Confidence, HeadPose, HeadPoseError, SeveralHeadsError
 from gp_labeler.imaging.anatomical_frame import SCAN_FRAME
 from gp_labeler.jobs.head import Straighten, StraightenByPoints
 from gp_labeler.models.workspace import Workspace
@@ -128,6 +128,26 @@ def test_refused_it_says_why_and_asks_for_points_and_leaves_all_as_it_was(worksp
     assert "Place IN and a pair" in workspace.head.refusal
     straightened(workspace, monkeypatch)
     assert workspace.head.refusal == ""
+
+
+def test_of_several_heads_the_user_says_which_one_is_meant(workspace, monkeypatch) -> None:
+    def refuse(job, progress):
+        if job.near is None:
+            raise SeveralHeadsError([np.array([-20.0, 0.0, 1.0]), np.array([22.0, 3.0, 0.0])])
+        return POSE
+
+    monkeypatch.setattr(Straighten, "run", refuse)
+    workspace.head.straighten()
+    deliver(workspace)
+    assert workspace.head.frame is None
+    assert workspace.head.heads == ((-20, 0, 1), (22, 3, 0))
+    assert workspace.head.head_names == ("Head 1 (towards R)", "Head 2 (towards L)")
+    assert "contains 2 heads" in workspace.head.refusal
+    workspace.head.straighten(workspace.head.heads[1])
+    deliver(workspace)
+    assert workspace.head.frame.matrix == HEAD.matrix
+    assert workspace.head.heads == ()
+    np.testing.assert_allclose(workspace.view.crosshair, [22, 3, 0], atol=workspace.scan.volume.spacing[0])
 
 
 def test_a_cancelled_search_changes_nothing(workspace, monkeypatch) -> None:

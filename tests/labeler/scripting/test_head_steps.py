@@ -53,6 +53,7 @@ def test_the_head_is_turned_by_hand_and_what_is_refused_ends_the_script(tmp_path
         ({"do": "straighten", "by": "luck"}, "by must be one of symmetry"),
         ({"do": "straighten", "by": "points", "midline": [0, 0, 0]}, "needs midline, left and right"),
         ({"do": "straighten", "left": [0, 0, 0]}, "is for by = 'points'"),
+        ({"do": "straighten", "by": "landmarks", "near": [0, 0, 0]}, "is for by = 'symmetry'"),
         ({"do": "view", "plane": "up"}, "plane must be one of"),
         ({"do": "view", "frame": "atlas"}, "frame must be one of"),
         ({"do": "view", "turn": {"3d": 4.0}}, "turn must be one of"),

@@ -14,6 +14,7 @@ from gp_labeler.views.panels.label.landmark_table import LandmarkTable
 from gp_labeler.views.panels.label.left_row import LeftRow
 from gp_labeler.views.panels.label.observer_row import ObserverRow
 from gp_labeler.views.panels.label.suggest_row import SuggestRow
+from gp_labeler.views.panels.label.tilt_row import TiltRow
 from gp_labeler.views.panels.parts import Scrolled
 
 __all__ = ["LabelPanel"]
@@ -39,6 +40,7 @@ class LabelPanel(QWidget):
         self.setProperty("role", "panel")
         self.observer = ObserverRow(workspace, actions)
         self.suggest = SuggestRow(workspace, actions)
+        self.tilt = TiltRow(workspace, actions)
         self.left = LeftRow(workspace, actions)
         self.card = FeatureCard(workspace, actions)
         self.table = LandmarkTable(workspace)
@@ -51,6 +53,7 @@ class LabelPanel(QWidget):
         column.addLayout(
             in_row(wide(self.observer), placed(self.suggest, Qt.AlignmentFlag.AlignBottom), spacing=0)
         )
+        column.addWidget(self.tilt)
         column.addWidget(self.left)
         column.addWidget(self.card, 1)
         column.addWidget(self.table, 2)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from qtpy.QtCore import QTimer
 from qtpy.QtWidgets import QCheckBox, QPushButton, QToolButton, QVBoxLayout, QWidget
 
+from gp_labeler.document.state import Position
 from gp_labeler.models.head import FREE_POINTS
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit
+from gp_labeler.views.formatting import position_text
 from gp_labeler.views.panels.action_button import Actions, action_button, do_action
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, Notice, emptied, text_label
@@ -39,6 +41,9 @@ class HeadCard(Card):
         self._notices = QVBoxLayout()
         self._notices.setSpacing(6)
         self.add(self._notices)
+        self._heads = QVBoxLayout()
+        self._heads.setSpacing(6)
+        self.add(self._heads)
         self.confirm = action_button(actions["head.confirm_left"], "Left is correct")
         self.exchanged = action_button(actions["head.left_is_right"], "They are exchanged…")
         self._answers = _row(self.confirm, self.exchanged)
@@ -77,7 +82,8 @@ class HeadCard(Card):
         self.setVisible(workspace.scan.volume is not None)
         self.state.setText(head_text(workspace))
         emptied(self._notices)
-        if head.refusal:
+        self._offer_heads()
+        if head.refusal and not head.heads:
             self._notices.addWidget(Notice("warning", head.refusal))
         wrong = head.wrong_sides()
         if wrong:
@@ -97,6 +103,24 @@ class HeadCard(Card):
         for name, button in self.points.items():
             button.setText(f"{name.capitalize()} {_TICK}" if name in head.points else name.capitalize())
         self._measure_timer.start()  # what was put in shows a turn later: only then is its room known
+
+    def _offer_heads(self) -> None:
+        """Ask which head is meant, in a scan of several."""
+        head = self._workspace.head
+        emptied(self._heads)
+        if not head.heads:
+            return
+        words = f"The scan contains {len(head.heads)} heads. Which one do you label?"
+        self._heads.addWidget(Notice("warning", words))
+        named = zip(head.head_names, head.heads, strict=True)
+        self._heads.addWidget(_row(*(self._head_button(name, position) for name, position in named)))
+
+    def _head_button(self, name: str, position: Position) -> QPushButton:
+        head = self._workspace.head
+        button = QPushButton(name)
+        button.setToolTip(f"Straightens the head at {position_text(position)}")
+        button.clicked.connect(lambda: head.straighten(position))
+        return button
 
     def _lay_out_points(self, actions: Actions) -> None:
         self.points = {n: action_button(actions[f"head.{n}"], n.capitalize()) for n in FREE_POINTS}
