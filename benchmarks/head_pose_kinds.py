@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -20,14 +21,31 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from head_pose import DATA, FACES, Case, cropped, judged, mouse, phantom, seeds, show, summary, turned
 from scipy.ndimage import gaussian_filter, zoom
 
-from gp_labeler.head_pose import MidPlane
-from gp_labeler.head_pose.template import phantom_template
-from gp_labeler.imaging.threshold import propose_threshold
-from gp_labeler.imaging.volume import Volume
-from gp_labeler.phantom import USUAL
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
+
+from head_pose import (  # noqa: E402
+    DATA,
+    FACES,
+    Case,
+    cropped,
+    judged,
+    mouse,
+    phantom,
+    seeds,
+    show,
+    summary,
+    turned,
+    two_heads,
+)
+
+from gp_labeler.head_pose import MidPlane  # noqa: E402
+from gp_labeler.head_pose.template import phantom_template  # noqa: E402
+from gp_labeler.imaging.threshold import propose_threshold  # noqa: E402
+from gp_labeler.imaging.volume import Volume  # noqa: E402
+from gp_labeler.phantom import USUAL  # noqa: E402
 
 Alter = Callable[[Case, np.random.Generator], Case]
 
@@ -163,7 +181,7 @@ def with_table(case: Case, rng: np.random.Generator) -> Case:
     v, face = case.volume, int(rng.integers(6))
     axis, n = face % 3, max(2, case.volume.array.shape[face % 3] // 30)
     table = np.full([n if a == axis else m for a, m in enumerate(v.array.shape)], bone_value(case))
-    table = np.roll(np.concatenate([table, np.full_like(table, v.array.min())], axis), 0, axis)
+    table = np.concatenate([table, np.full_like(table, v.array.min())], axis)
     parts = [v.array, np.flip(table, axis)] if face < 3 else [table, v.array]
     T = v.T_scan_voxel.copy()
     if face >= 3:
@@ -284,15 +302,8 @@ def cases(args: argparse.Namespace) -> Iterator[Case]:
             yield whole
         yield from altered(whole, [k for k in kinds if k in KINDS], n)
         if previous is not None and (not args.kinds or "two heads" in args.kinds):
-            yield two_in_a_scan(whole, previous, n)
+            yield two_heads(whole, previous, "may: two heads")
         previous = whole
-
-
-def two_in_a_scan(case: Case, other: Case, n: int) -> Case:
-    """Return a scan of two heads, one beside, above or before the other."""
-    from head_pose import two_heads
-
-    return two_heads(case, other, "may: two heads")
 
 
 def main() -> None:
