@@ -333,6 +333,13 @@ class Bone:
         axes = self.scan.T_scan_index[:3, :3]
         return float(np.sqrt(np.trace(axes @ np.cov(self.index.T, bias=True) @ axes.T)))
 
+    @cached_property
+    def thickness(self) -> float:
+        """Volume over surface, in radii: 0.04 to 0.07 of a skull, 0.13 to 0.3 of a head with its flesh."""
+        edge = np.prod(self.scan.spacing) ** (1 / 3)
+        n_surface = int(np.count_nonzero(self.surface))
+        return len(self.index) / n_surface * float(edge) / self.radius
+
 
 def indices_of(mask: _Mask) -> NDArray[np.intp]:
     """Return i, j, k (N, 3) of the voxels of a mask."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -48,6 +48,7 @@ _GAIN, _LATE_GAIN = 0.15, 0.04
 quick one; what is farther behind is left."""
 
 _THIN_MARGIN = 0.03
+_MUCH_THICKER = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,15 +141,8 @@ def _mid_plane(
     report: Report,
 ) -> _Found:
     """Return the first plane that can be trusted, over thresholds and islands of bone."""
-    levels = _levels(coarse) if threshold is None else (threshold,)
     tried: list[_Found] = []
-    problem: GpError | None = None
-    for level in levels:
-        try:
-            islands = _Islands.above(level, fine, coarse)
-        except GpError as error:
-            problem = error
-            continue
+    for islands in _islands_at(_levels(coarse) if threshold is None else (threshold,), fine, coarse):
         heads = _separate_heads(islands, report)
         if heads:
             return _meant_head(heads, meant, islands, volume, report)
@@ -157,8 +151,6 @@ def _mid_plane(
             tried.append(found)
             if found.accepted:
                 return found
-    if not tried:
-        raise problem or GpError("there is no bone", file=volume.path)
     raise HeadPoseError(_why(max(tried, key=lambda f: f.confidence.agreement)), file=volume.path)
 
 
@@ -186,6 +178,24 @@ class _Islands:
             return float(np.linalg.norm(other.centre - bone.centre)) + abs(other.radius - bone.radius)
 
         return min(self._refined, key=unlike)
+
+
+def _islands_at(levels: Sequence[float], fine: CoarseScan, coarse: CoarseScan) -> list[_Islands]:
+    """Return the bone above each threshold, the likeliest first; raises `GpError` where there is none at all.
+
+    What is much thicker than what lies above the next threshold is a head with its flesh: it is symmetric,
+    too, but less exactly, and the template of a skull does not fit it.
+    """
+    found, problem = [], None
+    for level in levels:
+        try:
+            found.append(_Islands.above(level, fine, coarse))
+        except GpError as error:
+            problem = error
+    if problem is not None and not found:
+        raise problem
+    thickness = [islands.searched[0].thickness for islands in found]
+    return found[::-1] if thickness[0] > _MUCH_THICKER * thickness[-1] else found
 
 
 def _separate_heads(islands: _Islands, report: Report) -> list[_Found]:

@@ -23,7 +23,7 @@ from gp_labeler.head_pose import (
     straighten_by_landmarks,
     straighten_by_points,
 )
-from gp_labeler.head_pose.bone import bone_of, coarse_scan, indices_of, threshold_above
+from gp_labeler.head_pose.bone import Bone, bone_of, coarse_scan, indices_of, threshold_above
 from gp_labeler.head_pose.distance_field import DistanceField
 from gp_labeler.head_pose.template import front_and_up
 from gp_labeler.imaging.progress import Cancelled, Report
@@ -71,6 +71,16 @@ def test_a_head_is_straightened_by_the_symmetry_of_its_bone():
     assert found().warnings == ()
     assert "file's orientation" in found().left
     assert "proposed" in found().pitch
+
+
+def test_flesh_that_is_as_symmetric_is_not_taken_for_bone():
+    phantom = head(404, (*USUAL, "clip"), (-70.0, 20.0, 110.0))
+    coarse = coarse_scan(phantom.volume, 1.0)
+    flesh, bone = (Bone.islands(coarse, level)[0] for level in (6_000, 14_000))
+    assert flesh.thickness > 2 * bone.thickness
+    pose = straighten(phantom.volume)
+    assert errors(pose, phantom)[2] < 3.0
+    assert pose.warnings == ()
 
 
 def test_the_head_frame_is_left_posterior_superior():
