@@ -147,8 +147,11 @@ def start_messages(prog: str, words: Sequence[str], verbose: bool | None, log_fi
         The file cannot be written.
     """
     command = prog.split()[0]
+    of_a_caller = list(logging.getLogger().handlers)
     logging.basicConfig(format=f"{command}: %(message)s", level=logging.WARNING)
     for handler in logging.getLogger().handlers:
+        if handler not in of_a_caller:
+            handler.addFilter(_is_ours)
         if type(handler) is logging.StreamHandler:  # the terminal's, not what a caller has set up
             handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
     ours = [logging.getLogger(package) for package in _PACKAGES]
@@ -170,6 +173,11 @@ def start_messages(prog: str, words: Sequence[str], verbose: bool | None, log_fi
             prog,
             " ".join(words),
         )
+
+
+def _is_ours(record: logging.LogRecord) -> bool:
+    """Whether a message is for people: libraries speak of their own insides, such as of a broken TIFF."""
+    return record.name.partition(".")[0] in _PACKAGES
 
 
 class _LogFile(logging.FileHandler):

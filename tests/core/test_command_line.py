@@ -26,6 +26,19 @@ def test_verbose_says_what_is_read_and_written(tmp_path: Path) -> None:
     assert f"gp-core: wrote {tmp_path / 'pose.json'}" in told.stderr
 
 
+def test_what_libraries_say_is_not_for_the_terminal(tmp_path: Path) -> None:
+    code = """if True:
+        import logging
+        from gp_core.command_line import start_messages
+        start_messages("gp-core check", [], None, None)
+        logging.getLogger("tifffile").error("invalid page offset")
+        logging.getLogger("gp_core.io").warning("taken as LPS")
+    """
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.stderr == "gp-core: taken as LPS\n"
+
+
 def test_a_log_holds_everything_and_grows(tmp_path: Path) -> None:
     for _ in range(2):
         done = _estimate("--log-file", "run.log", cwd=tmp_path)
