@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import logging
-import re
 from os import PathLike
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from gp_core.io.labelled_points import (
     labelled_point,
     points_of,
 )
-from gp_core.io.text import flips_xy, shown, split_fields, split_lines
+from gp_core.io.text import flips_xy, shown, split_fields, split_lines, stated_system
 from gp_core.io.text_files import read_text
 from gp_core.landmarks.sets import LandmarkSet, Status
 
@@ -32,7 +31,6 @@ _HEADER = """\
 # CoordinateSystem = LPS
 # columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID
 """
-_SYSTEM = re.compile(r"#\s*CoordinateSystem\s*=(.*)", re.IGNORECASE)
 _MOST_COLUMNS = 16
 _STATUSES = tuple(STATUS_WORDS.values())  # in the order of Slicer's numbers
 
@@ -58,7 +56,7 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
     """
     lines = split_lines(read_text(path), path)
     heads = [line.lstrip('" ') for _, line in lines]
-    system = _system(heads, path)
+    system = stated_system(heads, path)
     body = [numbered for numbered, head in zip(lines, heads, strict=True) if not head.startswith("#")]
     first = body[0][1] if body else ""
     n_marks = first.count(";")  # as saved by a spreadsheet; a description may contain some too
@@ -75,18 +73,6 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
         for number, fields in rows
     ]
     return PointList(tuple(points), Path(path))
-
-
-def _system(heads: list[str], file: str | PathLike[str]) -> str | None:
-    """Return the coordinate system that a file names; files joined by hand may name two."""
-    named = [m[1].strip(' ",;') for line in heads if (m := _SYSTEM.match(line))]
-    if len({flips_xy(system, file) for system in named}) > 1:
-        raise FileFormatError(
-            f"names several coordinate systems: {', '.join(dict.fromkeys(named))}",
-            file=file,
-            remedy="Export each point list to a file of its own.",
-        )
-    return named[0] if named else None
 
 
 def _unpadded(fields: list[str]) -> list[str]:

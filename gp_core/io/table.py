@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -23,11 +23,13 @@ from gp_core.io.labelled_points import (
 from gp_core.io.text import (
     MAX_POINTS,
     as_csv_cell,
+    flips_xy,
     has_decimal_comma,
     of_csv_cell,
     shown,
     split_fields,
     split_lines,
+    stated_system,
 )
 from gp_core.io.text_files import read_text
 from gp_core.landmarks.features import Side
@@ -37,7 +39,7 @@ from gp_core.landmarks.sets import LandmarkSet, Status
 __all__ = ["read_rows", "read_table", "write_csv"]
 
 _NAME_COLUMNS = ("label", "name", "landmark", "feature", "code", "point")
-_AXES = {"lps": False, "ras": True, "xyz": False}  # whether x and y change sign on the way to LPS
+_AXES = {"lps": False, "ras": True, "xyz": None}  # whether x and y change sign to LPS; None: not said
 _UNIT_MM = re.compile(r"\s*[\[(_ ]\s*mm\s*[\])]?$")  # x_mm, "x (mm)", "x [mm]"
 _HEADER = ("label", "l", "p", "s", "defined", "selected", "visible", "locked", "description", "status")
 _ABOUT = {
@@ -62,7 +64,7 @@ class _Columns:
     label: int
     axes: tuple[int, ...]
     width: int
-    flip_xy: bool
+    flip_xy: bool | None
     others: Mapping[str, int]
 
 
@@ -70,9 +72,10 @@ def read_table(path: str | PathLike[str]) -> PointList:
     """Read a table of named points.
 
     With a header, columns are found by name: ``label`` (or ``name``, ``landmark``, ...); ``l,p,s``,
-    ``r,a,s`` or ``x,y,z`` (taken as LPS); and, where present, ``side``, ``trial``, ``defined``, ``status``
-    and ``description``. Without one, the columns are name, x, y, z. Row names as written by R, whose column
-    has no name, are labels; the first line ``sep=;`` of a spreadsheet is understood.
+    ``r,a,s`` or ``x,y,z`` (LPS, unless a line such as ``# CoordinateSystem = RAS`` states another system);
+    and, where present, ``side``, ``trial``, ``defined``, ``status`` and ``description``. Without one, the
+    columns are name, x, y, z. Row names as written by R, whose column has no name, are labels; the first line
+    ``sep=;`` of a spreadsheet is understood, and its empty rows are passed over.
 
     Parameters
     ----------
@@ -87,12 +90,15 @@ def read_table(path: str | PathLike[str]) -> PointList:
     Raises
     ------
     FileFormatError
-        Columns are missing, a row has the wrong number of them, or a position is not three finite numbers.
+        Columns are missing, a row has the wrong number of them, a position is not three finite numbers, or
+        the columns contradict the stated coordinate system.
     """
-    rows = read_rows(path)
+    lines = split_lines(read_text(path), path)
+    rows = [(number, fields) for number, fields in _split(lines, path, aligned=True) if any(fields)]
     names = _header_names(rows)
     has_header = any(name in _NAME_COLUMNS for name in names)
-    columns = _columns(names, path) if has_header else _Columns(0, (1, 2, 3), 4, False, {})
+    columns = _columns(names, path) if has_header else _Columns(0, (1, 2, 3), 4, None, {})
+    columns = _in_stated_system(columns, lines, path)
     points = tuple(_point(fields, columns, number, path) for number, fields in rows[has_header:])
     return PointList(points, Path(path))
 
@@ -135,11 +141,14 @@ def read_rows(
     FileFormatError
         Not such a text, or quotes that do not close.
     """
-    lines = [
-        (number, line)
-        for number, line in split_lines(read_text(path), path, at_most=at_most)
-        if not line.startswith("#")
-    ]
+    return _split(split_lines(read_text(path), path, at_most=at_most), path, aligned=aligned)
+
+
+def _split(
+    lines: list[tuple[int, str]], path: str | PathLike[str], *, aligned: bool
+) -> list[tuple[int, list[str]]]:
+    """Return the fields of lines; the arguments are those of `read_rows`."""
+    lines = [(number, line) for number, line in lines if not line.startswith("#")]
     stated = _SEPARATOR_LINE.fullmatch(lines[0][1].strip()) if lines else None
     if stated is not None:
         lines = lines[1:]
@@ -169,6 +178,22 @@ def _columns(names: list[str], file: str | PathLike[str]) -> _Columns:
     )
 
 
+def _in_stated_system(columns: _Columns, lines: list[tuple[int, str]], file: str | PathLike[str]) -> _Columns:
+    """Return the columns with the coordinate system that a comment of the file states, if it does."""
+    system = stated_system((line.lstrip('" ') for _, line in lines), file)
+    if system is None:
+        return columns
+    flip_xy = flips_xy(system, file)
+    if columns.flip_xy not in (None, flip_xy):
+        named = "r,a,s" if columns.flip_xy else "l,p,s"
+        raise FileFormatError(
+            f"states the coordinate system {system}, but has the columns {named}",
+            file=file,
+            remedy="Correct one of them.",
+        )
+    return replace(columns, flip_xy=flip_xy)
+
+
 def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLike[str]) -> LabelledPoint:
     needed = max(columns.label, *columns.axes) + 1
     if len(fields) < needed or any(fields[columns.width :]):
@@ -189,7 +214,7 @@ def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLi
         _status(other("status"), other("defined"), label, file),
         file=file,
         description=of_csv_cell(other("description")),
-        flip_xy=columns.flip_xy,
+        flip_xy=bool(columns.flip_xy),
     )._replace(side=_side(other, label, file), trial=_trial(other, label, file))
     about = {key: text for name, key in _ABOUT.items() if (text := of_csv_cell(other(name)))}
     if point.provenance is not None or not about:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 
 import numpy as np
@@ -26,6 +26,7 @@ __all__ = [
     "shown",
     "split_fields",
     "split_lines",
+    "stated_system",
 ]
 
 MAX_POINTS = 10_000
@@ -41,6 +42,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 DECIMAL_POINTS = "Write decimal points, not commas."
 
 # 3D Slicer's words, and the numbers that old files have instead.
+_SYSTEM = re.compile(r"#\s*CoordinateSystem\s*=(.*)", re.IGNORECASE)
 _FLIPS_XY = {"LPS": False, "1": False, "RAS": True, "0": True, "": False}
 
 
@@ -222,6 +224,36 @@ def flips_xy(system: object, file: str | PathLike[str]) -> bool:
             remedy="Export it in one of them.",
         )
     return _FLIPS_XY[word]
+
+
+def stated_system(lines: Iterable[str], file: str | PathLike[str]) -> str | None:
+    """Return the coordinate system that a comment such as ``# CoordinateSystem = RAS`` states.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        Lines of a file, without blanks and quotes before them.
+    file : path-like
+        For messages.
+
+    Returns
+    -------
+    str or None
+        As the file names it; None where it states none.
+
+    Raises
+    ------
+    FileFormatError
+        It states several, as files do that were joined by hand, or one that is neither LPS nor RAS.
+    """
+    stated = [found[1].strip(' ",;') for line in lines if (found := _SYSTEM.match(line))]
+    if len({flips_xy(system, file) for system in stated}) > 1:
+        raise FileFormatError(
+            f"names several coordinate systems: {', '.join(dict.fromkeys(stated))}",
+            file=file,
+            remedy="Export each point list to a file of its own.",
+        )
+    return stated[0] if stated else None
 
 
 def parse_position(

@@ -31,7 +31,6 @@ _PROBE = re.compile(r"stylus|probe|pointer", re.IGNORECASE)
 _FIELD = re.compile(
     rb"^Seq_Frame(?P<frame>\d+)_(?P<field>\w+?)\s*:?=\s*(?P<value>[^\r\n]*?)\s*$", re.MULTILINE
 )
-_OPPOSITE = "TrackerTo"
 _POSE, _STATUS, _TIME = "Transform", "TransformStatus", "Timestamp"
 
 _NOT_SEEN = ("", "na", "nan", "null", "missing")
@@ -226,10 +225,16 @@ def _chosen(names: list[str], wanted: str | None, reference: str | None, file: s
 def _to_tracker(frames: list[_Frame], name: str) -> FloatArray:
     """Return ``T_tracker_marker`` in every frame; one whose name says the opposite is inverted."""
     poses = np.array([frame.pose(name) for frame in frames])
-    if not name.startswith(_OPPOSITE):
+    if not _is_opposite(name):
         return poses
     every = np.tile(np.eye(4), (len(poses), 1, 1))
     return _in_reference(poses, every)
+
+
+def _is_opposite(name: str) -> bool:
+    """Whether a name such as ``TrackerToStylus`` leads to the probe, and not from it."""
+    source, _, target = name.partition("To")
+    return source == "Tracker" or (not _PROBE.search(source) and _PROBE.search(target) is not None)
 
 
 def _in_reference(T_tracker_reference: FloatArray, T_tracker_marker: FloatArray) -> FloatArray:
@@ -370,12 +375,10 @@ def _matrices(rows: list[tuple[int, list[str]]], file: str | PathLike[str]) -> F
             remedy=_FORM,
         )
     values = np.array(numbers)
-    if width == 4:
-        return values.reshape(-1, 4, 4)
-    values = values[:, _COLUMNS[width] :]
+    n_rows = 4 if width == 4 else (width - _COLUMNS[width]) // 4
+    values = values[:, _COLUMNS.get(width, 0) :].reshape(-1, n_rows, 4)
     poses = np.tile(np.eye(4), (len(values), 1, 1))
-    n_rows = values.shape[1] // 4
-    poses[:, :n_rows] = values.reshape(-1, n_rows, 4)
+    poses[:, :n_rows] = values
     return poses.transpose(0, 2, 1) if _by_columns(poses) else poses
 
 

@@ -23,6 +23,11 @@ def file(tmp_path):
         "label,l,p,s,defined,selected,visible,locked,description\nCA,1,2,3,1,1,1,0,\nRWP,4,5.5,6,1,1,1,0,far\n",
         "label,r,a,s\nCA,-1,-2,3\nRWP,-4,-5.5,6\n",
         "# touched by J. D.\nCA 1 2 3\nRWP 4 5.5 6\n",
+        "name    x    y    z\nCA      1    2    3\nRWP     4  5.5    6\n",
+        "name;x;y;z\nCA;1;2;3\nRWP;4;5.5;6\n;;;\n;;;\n",
+        "# CoordinateSystem = RAS\nname,x,y,z\nCA,-1,-2,3\nRWP,-4,-5.5,6\n",
+        "# CoordinateSystem = 0\nCA,-1,-2,3\nRWP,-4,-5.5,6\n",
+        "# CoordinateSystem = LPS\nlabel,l,p,s\nCA,1,2,3\nRWP,4,5.5,6\n",
         '\ufeff"CA","1","2","3"\n"RWP","4","5.5","6"\n',
     ],
 )
@@ -71,6 +76,8 @@ def test_empty_coordinates_are_not_placed(file, caplog):
         ("name,x,y,z\n", "holds no points"),
         ("# nothing\n", "holds no points"),
         ("label,l,p,s,status\nCA,1,2,3,done\n", "landmark CA: status must be one of .*'done'"),
+        ("# CoordinateSystem = RAS\nlabel,l,p,s\nCA,1,2,3\n", "states the coordinate system RAS.*l,p,s"),
+        ("# CoordinateSystem = IJK\nCA,1,2,3\n", "must be LPS or RAS, got 'IJK'"),
         ('"CA,1,2,3\n', "line 1 cannot be split"),
     ],
 )

@@ -87,6 +87,9 @@ _WRITERS = {
             for k, p in enumerate(poses)
         ],
     ),
+    "column by column, in four rows": lambda folder, poses: _table(
+        folder / "a.csv", "", [row for p in poses for row in p.T]
+    ),
     "column by column": lambda folder, poses: _table(folder / "a.csv", "", [[*p.T.ravel()] for p in poses]),
     "brackets": lambda folder, poses: _text(
         folder / "a.csv", "\n".join(str(p.ravel().tolist()) for p in poses) + "\n"
@@ -135,11 +138,12 @@ def test_a_sequence_that_is_gzipped_as_a_whole_is_read(tmp_path, write) -> None:
     assert read_recording(packed).poses == pytest.approx(poses, abs=1e-6)
 
 
-def test_a_transform_whose_name_says_the_opposite_is_inverted(tmp_path) -> None:
+@pytest.mark.parametrize("name", ["TrackerToStylus", "TrackerToMarker", "ReferenceToProbe"])
+def test_a_transform_whose_name_says_the_opposite_is_inverted(name: str, tmp_path) -> None:
     poses = _turning(12)
-    text = _fields(np.linalg.inv(poses), " = ").replace("StylusToTracker", "TrackerToStylus")
+    text = _fields(np.linalg.inv(poses), " = ").replace("StylusToTracker", name)
     found = read_recording(_text(tmp_path / "a.txt", text))
-    assert found.transform == "TrackerToStylus"
+    assert found.transform == name
     assert found.poses == pytest.approx(poses, abs=1e-5)
 
 
