@@ -112,18 +112,23 @@ def _check_length(path: Path, n_values: int, dtype: np.dtype[Any]) -> None:
     """
     with path.open("rb") as file:
         head = file.read(_VTK_HEAD)
-    each = dtype.itemsize
-    start = _GIPL_HEADER
-    if head.startswith(b"# vtk"):
-        start = _vtk_data(head)
-        each = each if _is_binary(head[:start]) else 2  # a digit and a blank
-    have, need = path.stat().st_size, start + each * n_values - (each == 2 and dtype.itemsize != 2)
+    is_vtk = head.startswith(b"# vtk")
+    start = _vtk_data(head) if is_vtk else _GIPL_HEADER
+    have, need, what = path.stat().st_size, start + dtype.itemsize * n_values, "bytes"
+    if is_vtk and not _is_binary(head[:start]):
+        have, need, what = _words_from(path, start), n_values, "values"
     if have < need:
         raise VolumeError(
-            f"{path.name} holds {have:,} bytes, but {need:,} are needed: it is incomplete",
+            f"{path.name} holds {have:,} {what}, but {need:,} are needed: it is incomplete",
             file=path,
             remedy="Copy it again.",
         )
+
+
+def _words_from(path: Path, start: int) -> int:
+    with path.open("rb") as file:
+        file.seek(start)
+        return sum(len(line.split()) for line in file)
 
 
 def read_itk_planes(path: Path) -> Plane:

@@ -661,6 +661,7 @@ def test_gipl_and_vtk(name: str, tmp_path: Path) -> None:
         (vtk(data="CELL_DATA") + BIG, "CELL_DATA"),
         (vtk().replace(b"\n", b"\r\n") + BIG, "line ends of Windows"),
         (vtk().replace(b"BINARY", b"ASCII") + b"1 2 3 " * 50, "it is incomplete"),
+        (vtk().replace(b"BINARY", b"ASCII") + b"1000 " * (RAW.size - 9), "values.*it is incomplete"),
     ],
 )
 def test_vtk_that_cannot_be_read_as_it_stands(content: bytes, words: str, tmp_path: Path) -> None:
