@@ -224,6 +224,8 @@ def _filled(word: str, named: dict[str, str]) -> str:
     return word
 
 
+_COMMANDS = ("gp-core: ", "gp-labeler: ")
+
 GOOD: dict[str, Path] = {"folder": Path()}
 """Where the good samples are; set by the run."""
 
@@ -238,8 +240,10 @@ def _fault(status: int, said: str, error: str, output: Path, *, is_json: bool) -
         return f"status {status}"
     if status == 2:
         lines = error.splitlines()
-        if not lines or not lines[-1].startswith(("gp-core: ", "gp-labeler: ")):
+        if not lines or not lines[-1].startswith(_COMMANDS):
             return f"no line for status 2: {error!r:.200}"
+        if stray := next((line for line in lines if not line.startswith(_COMMANDS)), ""):
+            return f"a line of a library before that of status 2: {stray!r:.200}"
         if output.read_bytes() != OLD:
             return "the old file is gone"
     elif is_json and output.read_bytes() != OLD:
