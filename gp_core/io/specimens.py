@@ -12,13 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from gp_core.argument_types import checks_arguments
-from gp_core.errors import FeatureError, FileFormatError
-from gp_core.io.file_names import landmark_file_name, natural_key
+from gp_core.errors import FeatureError, FileFormatError, GpError
+from gp_core.io.file_names import landmark_file_name, named_side, natural_key
 from gp_core.io.markups import has_point_list
 from gp_core.io.reading import read_points, sides_of, specimen_of
+from gp_core.io.table import read_rows
 from gp_core.landmarks.anatomy import with_cochlea_origin
-from gp_core.landmarks.features import FEATURES, Side
-from gp_core.landmarks.labels import LabelNames
+from gp_core.landmarks.features import CODES, FEATURES, Side
+from gp_core.landmarks.labels import LabelNames, parse_label
 from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.provenance import Certainty, LabelProvenance
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
@@ -32,6 +33,7 @@ _ROUNDED_MM = 1e-3
 """Two files of a side that differ by no more hold the same labels in different formats."""
 
 _IN_FOLDERS = (".mrk.json", ".fcsv")
+_TABLES = (".csv", ".tsv")
 _RICHEST_FIRST = (".mrk.json", ".json", ".fcsv")
 
 
@@ -73,7 +75,8 @@ def load_specimens(
     ----------
     paths : path or iterable of path
         Landmark files of any kind, and folders; these are searched, not deeper, for ``.mrk.json`` and
-        ``.fcsv``. A file may hold both sides, told by its labels (``CA_L``) or a column ``side``.
+        ``.fcsv``; a warning names tables of a side that are left out. A file may hold both sides, told by its
+        labels (``CA_L``) or a column ``side``.
     names : LabelNames, optional
         A lab's own names of the features.
     observer : str, optional
@@ -316,9 +319,39 @@ def _files(paths: list[str | PathLike[str]]) -> list[Path]:
     if not paths:
         raise FileFormatError("no landmark files were given", remedy="Name files, or folders of them.")
     found = [file for path in paths for file in landmark_files(path)]
+    for path in paths:
+        _tell_of_tables(Path(path), found)
     return list(
         {file.absolute(): file for file in found}.values()
     )  # a file may be named along with its folder
+
+
+def _tell_of_tables(place: Path, found: Sequence[Path]) -> None:
+    """Warn of tables of a folder that hold a side which none of the files that are read is named after."""
+    tables = sorted(file for file in place.glob("*") if file.suffix.lower() in _TABLES)
+    read = {
+        file.name[: -len(suffix)] for file in found for suffix in _IN_FOLDERS if file.name.endswith(suffix)
+    }
+    left_out = [file.name for file in tables if file.stem not in read and _is_of_a_side(file)]
+    if left_out:
+        _log.warning(
+            "%s: its tables of landmarks are left out: %s. Name the files to read them",
+            place,
+            ", ".join(left_out),
+        )
+
+
+def _is_of_a_side(table: Path) -> bool:
+    """Return whether a table holds features, and it or its name tells the side; touches tell none."""
+    if table.name.startswith("."):
+        return False
+    try:
+        words = {word for _, fields in read_rows(table) for word in fields[:2]}
+        if not any(parse_label(word).name in CODES for word in words):
+            return False
+        return bool(read_points(table).sides or named_side(table))
+    except GpError:
+        return False
 
 
 def _is_markups(file: Path) -> bool:

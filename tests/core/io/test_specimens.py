@@ -74,6 +74,18 @@ def test_two_files_for_one_side_are_an_error(tmp_path):
         load_specimens(tmp_path)
 
 
+def test_tables_of_a_side_in_a_folder_are_not_left_out_in_silence(tmp_path, caplog):
+    write_markups(tmp_path / "GP01_L.mrk.json", some_landmarks(side="L"), specimen="GP01")
+    write_csv(tmp_path / "GP01_L.csv", some_landmarks(side="L"))  # the same in another format
+    (tmp_path / "touches.csv").write_text("CL,1,2,3\nMN,4,5,6\n")
+    (tmp_path / "notes_R.csv").write_text("day,weight\n1,2\n")
+    load_specimens(tmp_path)
+    assert caplog.text == ""
+    write_csv(tmp_path / "GP01_R.csv", some_landmarks(side="R"))
+    load_specimens(tmp_path)
+    assert "its tables of landmarks are left out: GP01_R.csv. Name the files" in caplog.text
+
+
 def test_a_folder_without_landmarks_is_named(tmp_path):
     with pytest.raises(
         FileFormatError, match=r"holds no landmark files \(\*\.mrk\.json, \*\.fcsv\)"
