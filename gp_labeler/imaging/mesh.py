@@ -5,16 +5,14 @@ Everything is in the scan frame (LPS, mm).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from vtkmodules.vtkCommonCore import mutable, vtkIdList
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData, vtkStaticCellLocator
-from vtkmodules.vtkFiltersCore import vtkProbeFilter
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 
 from gp_core.errors import GeometryError
 from gp_core.validation import FloatArray
@@ -26,15 +24,14 @@ from gp_labeler.imaging.vtk_arrays import (
     to_numpy,
     to_vtk,
     triangles_of,
-    triple,
 )
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-__all__ = ["Surface", "SurfaceHit"]
+    from gp_labeler.imaging.triangle_search import TriangleSearch
 
-_PICK_TOLERANCE = 1e-4
+__all__ = ["Surface", "SurfaceHit"]
 
 
 @dataclass(frozen=True)
@@ -75,11 +72,6 @@ class Surface:
         First and last voxel index of the part of the volume that was meshed.
     stride : int
         Voxels taken along each axis: 1 for full resolution.
-
-    Attributes
-    ----------
-    locator : vtkStaticCellLocator
-        Finds triangles along rays and near points, once it is built: at the first use, or by `prepare`.
     """
 
     mesh: pv.PolyData
@@ -87,8 +79,6 @@ class Surface:
     T_voxel_scan: FloatArray
     region: FloatArray
     stride: int = 1
-    locator: vtkStaticCellLocator = field(default_factory=vtkStaticCellLocator, init=False, repr=False)
-    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
 
     @property
     def points(self) -> NDArray[np.float32]:
@@ -116,20 +106,17 @@ class Surface:
         """(2, 3) lowest and highest coordinates, mm."""
         return np.array(self.mesh.GetBounds()).reshape(3, 2).T
 
-    @property
-    def ready(self) -> bool:
-        """Whether picking answers at once."""
-        return self.locator.GetDataSet() is not None
+    @cached_property
+    def search(self) -> TriangleSearch:
+        """Finds triangles along rays and near points; built at the first use, or by `prepare`."""
+        from gp_labeler.imaging.triangle_search import TriangleSearch  # numba, as below
+
+        return TriangleSearch.of(self.points, self.triangles)
 
     def prepare(self) -> Surface:
-        """Build the search structure for picking, in a job, before the first click needs it.
-
-        `vtkStaticCellLocator.BuildLocator` keeps the interpreter for itself (1.4 s at 5 million triangles),
-        so a filter that lets go of it is made to call it: a probe of one point.
-        """
-        with self._lock:
-            if not self.ready and self.n_triangles:
-                _build_without_blocking(self.locator, self.mesh)
+        """Build the search structure for picking, in a job, before the first click needs it."""
+        if self.n_triangles:
+            self.project(self.points[0])  # so that the search itself is loaded, too
         return self
 
     def pick(self, ray_origin: ArrayLike, ray_direction: ArrayLike) -> SurfaceHit | None:
@@ -149,17 +136,16 @@ class Surface:
         """
         origin = np.asarray(ray_origin, dtype=np.float64)
         direction = np.asarray(ray_direction, dtype=np.float64)
-        span = _span_in_box(origin, direction, self.bounds) if self.n_triangles else None
-        return (
-            None
-            if span is None
-            else self._first_hit(origin + span[0] * direction, origin + span[1] * direction)
-        )
+        length = float(np.linalg.norm(direction))
+        if not self.n_triangles or not length:
+            return None
+        beyond = float(np.linalg.norm(self.bounds - origin, axis=1).sum())  # all of it is nearer
+        return self._first_hit(origin, direction * (beyond / length))
 
     def blocks(self, start: ArrayLike, end: ArrayLike) -> bool:
         """Whether bone lies between two scan positions, mm."""
         first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-        return bool(self.n_triangles) and self._first_hit(first, last) is not None
+        return self._first_hit(first, last - first) is not None
 
     def project(self, point: ArrayLike) -> SurfaceHit:
         """Return the point of the surface nearest to a scan position.
@@ -171,10 +157,8 @@ class Surface:
         """
         if not self.n_triangles:
             raise GeometryError("the surface is empty: nothing can be projected onto it")
-        self.prepare()
-        nearest, triangle, part, squared = [0.0, 0.0, 0.0], _out(0), _out(0), _out(0.0)
-        self.locator.FindClosestPoint(triple(point), nearest, triangle, part, squared)
-        return self._hit(nearest, int(triangle))
+        triangle, nearest = self.search.nearest(np.asarray(point, dtype=np.float64))
+        return self._hit(nearest, triangle)
 
     def outside(self, region: FloatArray) -> Surface:
         """Return the surface without what lies inside a region of voxels, such as a finer surface's.
@@ -244,22 +228,14 @@ class Surface:
 
         write_mesh(self.mesh, Path(path))
 
-    def _first_hit(self, start: FloatArray, end: FloatArray) -> SurfaceHit | None:
-        self.prepare()
-        point, inside = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-        along, part, triangle = _out(0.0), _out(0), _out(0)
-        tolerance = _PICK_TOLERANCE * self.voxel_mm  # a ray may pass exactly between two triangles
-        found = self.locator.IntersectWithLine(
-            triple(start), triple(end), tolerance, along, point, inside, part, triangle
-        )
-        return self._hit(point, int(triangle)) if found else None
+    def _first_hit(self, start: FloatArray, along: FloatArray) -> SurfaceHit | None:
+        found = self.search.first_along(start, along) if self.n_triangles else None
+        return None if found is None else self._hit(start + found[1] * along, found[0])
 
-    def _hit(self, point: list[float], triangle: int) -> SurfaceHit:
-        corners = vtkIdList()
-        self.mesh.GetCellPoints(triangle, corners)
-        a, b, c = (np.array(self.mesh.GetPoint(corners.GetId(i))) for i in range(3))
+    def _hit(self, point: FloatArray, triangle: int) -> SurfaceHit:
+        a, b, c = self.points[self.triangles[triangle]].astype(np.float64)
         normal = np.cross(b - a, c - a)
-        return SurfaceHit(np.array(point), normal / (np.linalg.norm(normal) or 1.0), triangle, self.stride)
+        return SurfaceHit(point, normal / (np.linalg.norm(normal) or 1.0), triangle, self.stride)
 
 
 def _subset(mesh: vtkPolyData, kept: NDArray[np.bool_]) -> vtkPolyData:
@@ -283,34 +259,3 @@ def _arrays(mesh: vtkPolyData) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.i
         np.empty((0, 3), np.float32) if normals is None else to_numpy(normals),
         triangles_of(mesh),
     )
-
-
-def _build_without_blocking(locator: vtkStaticCellLocator, mesh: vtkPolyData) -> None:
-    searched = vtkPolyData()
-    searched.SetPoints(mesh.GetPoints())
-    searched.SetPolys(mesh.GetPolys())
-    searched.SetCellLocator(locator)
-    locator.SetDataSet(searched)
-    one_point = vtkPolyData()
-    one_point.SetPoints(points_of(np.array([mesh.GetCenter()])))
-    probe = vtkProbeFilter()
-    probe.SetInputData(one_point)
-    probe.SetSourceData(searched)
-    probe.Update()
-    locator.BuildLocator()  # does nothing where the probe has done it
-
-
-def _out(value: float) -> Any:
-    """Make a number that VTK can write into."""
-    return mutable(value)
-
-
-def _span_in_box(origin: FloatArray, direction: FloatArray, bounds: FloatArray) -> tuple[float, float] | None:
-    """Return where a ray enters and leaves a box a little wider, in lengths of `direction`, or None."""
-    margin = 1e-3 * (1.0 + float(np.ptp(bounds, axis=0).max()))
-    widened = bounds + margin * np.array([[-1.0], [1.0]])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossings = np.sort((widened - origin) / direction, axis=0)
-    crossings = np.nan_to_num(crossings, nan=0.0, posinf=np.inf, neginf=-np.inf)
-    enters, leaves = max(0.0, float(crossings[0].max())), float(crossings[1].min())
-    return (enters, leaves) if enters <= leaves and np.isfinite(leaves) else None

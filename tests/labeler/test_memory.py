@@ -86,7 +86,7 @@ def _remembered(workspace: Workspace) -> Refs:
         refs["voxels"] = weakref.ref(array.base)
     for n, surface in enumerate((*workspace.bone.surfaces, *workspace.bone.quick_surfaces)):
         refs |= {f"surface {n}": weakref.ref(surface), f"mesh {n}": weakref.ref(surface.mesh)}
-        refs[f"locator {n}"] = weakref.ref(surface.locator)
+        refs[f"search {n}"] = weakref.ref(surface.search)
     return refs
 
 

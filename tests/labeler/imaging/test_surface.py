@@ -218,9 +218,8 @@ def test_progress_and_cancel(mouse: Volume) -> None:
         assert told[-1] < 1.0
 
 
-def test_building_the_locator_lets_other_threads_run(mouse: Volume) -> None:
-    surface = extract_isosurface(mouse, 20.5)
-    unprepared = Surface(surface.mesh, surface.level, surface.T_voxel_scan, surface.region)
+def test_building_the_search_structure_lets_other_threads_run(mouse: Volume) -> None:
+    surface = extract_isosurface(mouse, 20.5).prepare()
     ticks, over = [0], threading.Event()
 
     def tick() -> None:
@@ -237,8 +236,6 @@ def test_building_the_locator_lets_other_threads_run(mouse: Volume) -> None:
         meanwhile = ticks[0] - before
     over.set()
     thread.join()
-    assert not unprepared.ready
-    assert unprepared.prepare().ready
     assert meanwhile > 3, "one or two may fall before and after a call that lets nobody run"
 
 
@@ -276,13 +273,13 @@ def test_what_a_user_can_do_wrong_is_said(tmp_path: Path) -> None:
     assert surface.only(np.zeros(surface.n_triangles, bool)).pick([0, 0, 0], [1, 0, 0]) is None
 
 
-def test_a_surface_is_let_go_with_its_locator() -> None:
+def test_a_surface_is_let_go_with_its_search_structure() -> None:
     surface = extract_isosurface(ball(np.eye(3)), 0.0)
-    mesh, locator = weakref.ref(surface.mesh), weakref.ref(surface.locator)
+    mesh, search = weakref.ref(surface.mesh), weakref.ref(surface.search)
     del surface
     gc.collect()
     assert mesh() is None
-    assert locator() is None
+    assert search() is None
 
 
 @pytest.mark.parametrize(
