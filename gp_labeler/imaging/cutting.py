@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonDataModel import vtkBox, vtkPolyData
@@ -18,7 +20,7 @@ _ON_THE_FACE = 1e-3
 
 
 def crossing(
-    index: FloatArray, triangles: NDArray[np.int64], region: FloatArray
+    index: FloatArray, triangles: NDArray[np.integer[Any]], region: FloatArray
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which triangles lie within a region of voxels, and which pass through its faces.
 

@@ -120,7 +120,7 @@ def _take(triangles: Any, chosen: Any, used: Any, number: Any) -> tuple[Any, int
     for i in range(len(used)):
         number[i] = n_points
         n_points += used[i]
-    taken = np.empty((n_triangles, 3), np.int64)
+    taken = np.empty((n_triangles, 3), triangles.dtype)
     n_triangles = 0
     for t in range(len(triangles)):
         if chosen[t]:
@@ -188,7 +188,7 @@ def compact(
 
 def subset(
     points: NDArray[Any], normals: NDArray[Any], triangles: _Numbers, chosen: NDArray[np.bool_]
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
+) -> tuple[NDArray[Any], NDArray[Any], _Numbers]:
     """Return the points, normals and triangles of some triangles, (T,) bool; `normals` may be empty."""
     used, number = np.zeros(len(points), np.bool_), np.empty(len(points), np.int32)
     taken, n_points = _take(triangles, chosen, used, number)

@@ -86,7 +86,7 @@ class Surface:
         return to_numpy(self.mesh.GetPoints().GetData())
 
     @property
-    def triangles(self) -> NDArray[np.int64]:
+    def triangles(self) -> NDArray[np.integer[Any]]:
         """(T, 3) rows of point numbers, counter-clockwise seen from outside (a view)."""
         return triangles_of(self.mesh)
 
@@ -251,7 +251,7 @@ def _subset(mesh: vtkPolyData, kept: NDArray[np.bool_]) -> vtkPolyData:
     return part
 
 
-def _arrays(mesh: vtkPolyData) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
+def _arrays(mesh: vtkPolyData) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.integer[Any]]]:
     """Return (N, 3) points and normals, which may be missing, and (T, 3) triangles, as views."""
     normals = mesh.GetPointData().GetNormals()
     return (

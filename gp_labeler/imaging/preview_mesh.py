@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +20,17 @@ _GROWTH = 1.05
 _FIRST_VOXELS = 2.0
 _FINE_SHARE = 0.4
 """Edge of the boxes where detail is kept, as a share of that elsewhere."""
+
 _TRIANGLES_EACH = 3.1
 """Triangles that are left of the surface for each square as large as a side of a box: 2.4 to 3.1 on synthetic
 heads and on balls."""
+
 _SAMPLE = 16
 """One triangle of so many is measured for the area of the surface."""
+
+_AT_A_TIME = 1 << 17
+"""Points, and triangles, of a surface: what is computed of all of them at once would take several times its
+memory."""
 
 
 def coarse_surface(
@@ -50,63 +58,109 @@ def coarse_surface(
     parts = (surface,) if isinstance(surface, Surface) else tuple(surface)
     if len(parts) == 1 and parts[0].n_triangles <= n_triangles:
         return parts[0]
-    first = parts[0]
-    points, normals, triangles = _as_one(parts)
-    fine = _inside(points, detailed)
-    share = np.where(fine, _FINE_SHARE, 1.0)
-    expected = (_TRIANGLES_EACH * _relative_area(points, triangles, share) / n_triangles) ** 0.5
-    box = max(_FIRST_VOXELS * max(part.voxel_mm for part in parts), expected)
+    first, area = parts[0], sum(_relative_area(part, detailed) for part in parts)
+    expected = (_TRIANGLES_EACH * area / n_triangles) ** 0.5
+    edge = max(_FIRST_VOXELS * max(part.voxel_mm for part in parts), expected)
+    grid = _Grid(np.min([part.bounds[0] for part in parts], axis=0), edge, detailed)
+    mesh = _joined([_clustered(_corners_of(part), grid, _AT_A_TIME) for part in parts])
     while True:
-        made = _clustered(points, normals, triangles, share * box)
-        n_made = made.GetNumberOfPolys()
+        mesh = _turned_outwards(_clustered(mesh, grid, len(mesh.points)))
+        n_made = len(mesh.triangles)
         if n_made <= n_triangles:
-            return Surface(poly_data(made), first.level, first.T_voxel_scan, first.region, first.stride)
-        box *= max(_GROWTH, (n_made / n_triangles) ** 0.5)
+            made = poly_data(mesh.to_vtk())
+            return Surface(made, first.level, first.T_voxel_scan, first.region, first.stride)
+        grid = replace(grid, edge=grid.edge * max(_GROWTH, (n_made / n_triangles) ** 0.5))
 
 
-def _as_one(parts: Sequence[Surface]) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-    """Return points, normals and triangles of all parts."""
-    offsets = np.cumsum([0, *(len(part.points) for part in parts)])
-    points = np.concatenate([part.points for part in parts]).astype(np.float64)
-    normals = np.concatenate([to_numpy(part.mesh.GetPointData().GetNormals()) for part in parts])
-    triangles = np.concatenate([part.triangles + n for part, n in zip(parts, offsets[:-1], strict=True)])
-    return points, normals.astype(np.float64), triangles
+@dataclass(frozen=True, eq=False)
+class _Mesh:
+    """(N, 3) points and normals, and (T, 3) triangles."""
+
+    points: NDArray[np.floating[Any]]
+    normals: NDArray[np.floating[Any]]
+    triangles: NDArray[np.integer[Any]]
+
+    def to_vtk(self) -> vtkPolyData:
+        """Return it as VTK has them."""
+        mesh = vtkPolyData()
+        mesh.SetPoints(points_of(self.points.astype(np.float32)))
+        mesh.SetPolys(cells_of(self.triangles))
+        mesh.GetPointData().SetNormals(to_vtk(self.normals.astype(np.float32), share=True))
+        return mesh
 
 
-def _relative_area(points: FloatArray, triangles: NDArray[np.int64], share: FloatArray) -> float:
-    """Return the area of a surface, mm², enlarged where the edges of the boxes are these (N,) shares."""
-    a, b, c = triangles[::_SAMPLE].T
-    doubled = np.linalg.norm(np.cross(points[b] - points[a], points[c] - points[a]), axis=1)
-    return float(_SAMPLE / 2 * (doubled / share[a] ** 2).sum())
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Boxes side by side from a corner on, smaller ones within the boxes where detail is kept."""
+
+    origin: FloatArray
+    edge: float
+    detailed: Sequence[FloatArray]
+
+    def boxes_of(self, points: FloatArray) -> NDArray[np.int64]:
+        """Return the number of the box of each of (N, 3) points."""
+        fine = _inside(points, self.detailed)
+        edges = np.where(fine, _FINE_SHARE * self.edge, self.edge)
+        i, j, k = np.floor((points - self.origin).T / edges).astype(np.int64)
+        across = 1 + max(int(i.max()), int(j.max()), int(k.max()))
+        box: NDArray[np.int64] = ((i * across + j) * across + k) * 2 + fine
+        return box
 
 
-def _inside(points: FloatArray, boxes: Sequence[FloatArray]) -> NDArray[np.bool_]:
+def _relative_area(part: Surface, detailed: Sequence[FloatArray]) -> float:
+    """Return the area of a surface, mm², enlarged where smaller boxes keep detail."""
+    a, b, c = (part.points[corner] for corner in part.triangles[::_SAMPLE].T)
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return float(_SAMPLE / 2 * (doubled / np.where(_inside(a, detailed), _FINE_SHARE, 1.0) ** 2).sum())
+
+
+def _inside(points: NDArray[np.floating[Any]], boxes: Sequence[FloatArray]) -> NDArray[np.bool_]:
     inside = np.zeros(len(points), dtype=bool)
     for low, high in boxes:
         inside |= ((points > low) & (points < high)).all(axis=1)
     return inside
 
 
-def _clustered(
-    points: FloatArray, normals: FloatArray, triangles: NDArray[np.int64], edges: FloatArray
-) -> vtkPolyData:
-    """Return a mesh in which points in one box of a grid, of these (N,) edges, that face one way are one."""
-    cells = np.floor((points - points.min(axis=0)) / edges[:, None]).astype(np.int64)
-    across = int(cells.max()) + 1
-    key = ((cells[:, 0] * across + cells[:, 1]) * across + cells[:, 2]) * 2 + (edges < edges.max())
-    _, first, cell = np.unique(key, return_index=True, return_inverse=True)
+def _corners_of(part: Surface) -> _Mesh:
+    return _Mesh(part.points, to_numpy(part.mesh.GetPointData().GetNormals()), part.triangles)
+
+
+def _joined(meshes: Sequence[_Mesh]) -> _Mesh:
+    offsets = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    return _Mesh(
+        np.concatenate([mesh.points for mesh in meshes]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([mesh.triangles + n for mesh, n in zip(meshes, offsets[:-1], strict=True)]),
+    )
+
+
+def _clustered(mesh: _Mesh, grid: _Grid, at_a_time: int) -> _Mesh:
+    """Return a mesh in which points in one box that face one way are one, of so many points at a time.
+
+    Points that follow each other lie side by side, so a box has points of few such runs.
+    """
+    number = np.empty(len(mesh.points), np.int64)
+    points, normals, n_made = [], [], 0
+    for run in _runs(len(mesh.points), at_a_time):
+        places, facing = mesh.points[run].astype(np.float64), mesh.normals[run].astype(np.float64)
+        cluster = _clusters(grid.boxes_of(places), facing)
+        number[run] = cluster + n_made
+        points.append(_means(places, cluster))
+        normals.append(_unit(_means(facing, cluster)))
+        n_made += len(points[-1])
+    triangles = [_not_flat(number[mesh.triangles[run]]) for run in _runs(len(mesh.triangles), at_a_time)]
+    return _Mesh(np.concatenate(points), np.concatenate(normals), np.concatenate(triangles))
+
+
+def _runs(n: int, at_a_time: int) -> Iterator[slice]:
+    return (slice(first, first + at_a_time) for first in range(0, n, at_a_time))
+
+
+def _clusters(box: NDArray[np.int64], normals: FloatArray) -> NDArray[np.int64]:
+    """Return which (N,) points become one: those in one box that face as the first one there, or the rest."""
+    _, first, cell = np.unique(box, return_index=True, return_inverse=True)
     faces_back = np.einsum("ij,ij->i", normals, normals[first][cell]) < 0
-    cluster = _numbered(2 * cell + faces_back)
-    places, facing = _means(points, cluster), _means(normals, cluster)
-    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-12)
-    corners = cluster[triangles]
-    a, b, c = corners.T
-    corners = _turned_outwards(corners[(a != b) & (b != c) & (c != a)], places, facing)
-    mesh = vtkPolyData()
-    mesh.SetPoints(points_of(places.astype(np.float32)))
-    mesh.SetPolys(cells_of(corners))
-    mesh.GetPointData().SetNormals(to_vtk(facing.astype(np.float32), share=True))
-    return mesh
+    return _numbered(2 * cell + faces_back)
 
 
 def _numbered(labels: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -120,8 +174,20 @@ def _means(values: FloatArray, cluster: NDArray[np.int64]) -> FloatArray:
     return np.stack([np.bincount(cluster, column) / counts for column in values.T], axis=1)
 
 
-def _turned_outwards(corners: NDArray[np.int64], places: FloatArray, facing: FloatArray) -> NDArray[np.int64]:
+def _unit(vectors: FloatArray) -> FloatArray:
+    unit: FloatArray = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+    return unit
+
+
+def _not_flat(corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    a, b, c = corners.T
+    left: NDArray[np.int64] = corners[(a != b) & (b != c) & (c != a)]
+    return left
+
+
+def _turned_outwards(mesh: _Mesh) -> _Mesh:
     """Return triangles, each once, whose corners run counter-clockwise as seen from where its points face."""
+    places, facing, corners = mesh.points, mesh.normals, mesh.triangles
     lowest_first = np.take_along_axis(corners, (corners.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     a, b, c = (places[lowest_first[:, n]] for n in range(3))
     outwards = facing[lowest_first].sum(axis=1)
@@ -131,4 +197,4 @@ def _turned_outwards(corners: NDArray[np.int64], places: FloatArray, facing: Flo
     _, once = np.unique(
         (lowest_first[:, 0] * n + lowest_first[:, 1]) * n + lowest_first[:, 2], return_index=True
     )
-    return np.asarray(lowest_first[np.sort(once)])
+    return replace(mesh, triangles=lowest_first[np.sort(once)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +12,16 @@ from gp_core.validation import FloatArray
 from gp_labeler.imaging.mesh import Surface
 from gp_labeler.imaging.vtk_arrays import poly_data, to_numpy, to_vtk
 
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
 __all__ = ["shaded_like"]
 
 _WIDTH_MM = 2.5
 """Over so much, inwards from the faces of its box, a finer mesh takes its own shading."""
 
 _NEIGHBOURS = 6
+_AT_A_TIME = 1 << 17
 
 
 def shaded_like(fine: Surface, around: Sequence[Surface], width_mm: float = _WIDTH_MM) -> Surface:
@@ -34,34 +39,39 @@ def shaded_like(fine: Surface, around: Sequence[Surface], width_mm: float = _WID
     width_mm : float
         Over how much the normals go over.
     """
+    from scipy.spatial import cKDTree  # takes long to import: not at start-up
+
     away = _from_faces(fine, around)
     near = np.flatnonzero(away < width_mm)
-    coarse = _within(around, fine.bounds, width_mm)
-    if not len(near) or not len(coarse[0]):
+    points, coarse = _within(around, fine.bounds, width_mm)
+    if not len(near) or not len(points):
         return fine
-    normals = to_numpy(fine.mesh.GetPointData().GetNormals()).astype(np.float64)
-    other, known = _normals_at(fine.points[near].astype(np.float64), normals[near], *coarse)
-    share = np.clip(away[near] / width_mm, 0.0, 1.0)
-    own = np.where(known, share**2 * (3 - 2 * share), 1.0)[:, None]
-    mixed = own * normals[near] + (1 - own) * other
-    normals[near] = mixed / np.maximum(np.linalg.norm(mixed, axis=1, keepdims=True), 1e-12)
+    tree = cKDTree(points)
+    normals = to_numpy(fine.mesh.GetPointData().GetNormals()).copy()
+    for some in np.array_split(near, 1 + len(near) // _AT_A_TIME):
+        own = normals[some].astype(np.float64)
+        other, known = _normals_at(fine.points[some].astype(np.float64), own, tree, coarse)
+        share = np.clip(away[some] / width_mm, 0.0, 1.0)
+        weight = np.where(known, share**2 * (3 - 2 * share), 1.0)[:, None]
+        mixed = weight * own + (1 - weight) * other
+        normals[some] = mixed / np.maximum(np.linalg.norm(mixed, axis=1, keepdims=True), 1e-12)
     mesh = fine.mesh.copy(deep=False)
-    mesh.GetPointData().SetNormals(to_vtk(normals.astype(np.float32), "Normals", share=True))
+    mesh.GetPointData().SetNormals(to_vtk(normals, "Normals", share=True))
     return Surface(poly_data(mesh), fine.level, fine.T_voxel_scan, fine.region, fine.stride)
 
 
 def _from_faces(fine: Surface, around: Sequence[Surface]) -> FloatArray:
     """Return how far (N,) points are from the faces of their box, mm; those of the scan do not count."""
-    index = fine.points @ fine.T_voxel_scan[:3, :3].T + fine.T_voxel_scan[:3, 3]
     spacing = np.linalg.norm(np.linalg.inv(fine.T_voxel_scan[:3, :3]), axis=0)
     whole = np.stack([part.region for part in around])
     first, last = whole[:, 0].min(axis=0), whole[:, 1].max(axis=0)
-    away = np.full(len(index), np.inf)
-    for axis in range(3):
+    away = np.full(len(fine.points), np.inf)
+    for axis, row in enumerate(fine.T_voxel_scan[:3]):  # a coordinate at a time: there are millions of points
+        index = fine.points @ row[:3] + row[3]
         if fine.region[0, axis] > first[axis]:
-            away = np.minimum(away, (index[:, axis] - fine.region[0, axis]) * spacing[axis])
+            away = np.minimum(away, (index - fine.region[0, axis]) * spacing[axis])
         if fine.region[1, axis] < last[axis]:
-            away = np.minimum(away, (fine.region[1, axis] - index[:, axis]) * spacing[axis])
+            away = np.minimum(away, (fine.region[1, axis] - index) * spacing[axis])
     return away
 
 
@@ -77,13 +87,11 @@ def _within(around: Sequence[Surface], bounds: FloatArray, margin: float) -> tup
 
 
 def _normals_at(
-    where: FloatArray, facing: FloatArray, points: FloatArray, normals: FloatArray
+    where: FloatArray, facing: FloatArray, tree: cKDTree, normals: FloatArray
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return the mean normals of nearby points that face about as `facing`, and where there are any."""
-    from scipy.spatial import cKDTree  # takes long to import: not at start-up
-
-    k = min(_NEIGHBOURS, len(points))
-    found = cKDTree(points).query(where, k=k)
+    k = min(_NEIGHBOURS, tree.n)
+    found = tree.query(where, k=k)
     distance, nearest = (np.asarray(each).reshape(-1, k) for each in found)
     near = normals[nearest]
     agrees = np.einsum("nki,ni->nk", near, facing) > 0  # not the other side of a thin wall

@@ -20,7 +20,7 @@ from gp_labeler.imaging.mesh import Surface, SurfaceHit
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.threshold import volume_level
 from gp_labeler.imaging.volume import GreyArray, Volume
-from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of
+from gp_labeler.imaging.vtk_arrays import narrow_cells, to_numpy, to_vtk, triangles_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -120,6 +120,8 @@ def extract_isosurface(
     report(0.6)
     if surface.n_triangles and (smallest_mm > 0 or largest is not None):
         surface.drop_parts(smallest_mm=smallest_mm, largest=largest)
+    if surface.n_triangles:
+        narrow_cells(surface.mesh)
     report(0.9)
     volume.check()
     if not surface.n_triangles:

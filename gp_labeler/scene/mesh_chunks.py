@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,14 +71,14 @@ class MeshChunk:
         if len(triangles) == self._surface.n_triangles:
             return self._surface.mesh
         low, high = int(triangles.min()), int(triangles.max()) + 1
-        used: slice | NDArray[np.int64] = slice(low, high)
+        used: slice | NDArray[np.integer[Any]] = slice(low, high)
         number = triangles - low
         if high - low > _SPREAD * len(triangles):
             used, flat = np.unique(triangles, return_inverse=True)
             number = flat.reshape(-1, 3)
         mesh = vtkPolyData()
         mesh.SetPoints(points_of(self._surface.points[used]))
-        mesh.SetPolys(cells_of(number, np.int32))
+        mesh.SetPolys(cells_of(number))
         if normals is not None:
             mesh.GetPointData().SetNormals(to_vtk(to_numpy(normals)[used], share=True))
         return mesh
