@@ -1,7 +1,8 @@
 """Run the code blocks of a page as a reader would, one after the other, in an empty folder.
 
-``console``: what follows ``$`` is run, and must print what stands below it (``...`` is anything). ``python``
-with prompts is a doctest. A block whose first line is ``# name.ext`` is saved as that file.
+``console``: what follows ``$`` is run, and must print what stands below it (``...`` is anything); where that is
+the line of an error, such as ``gp-core: …``, it must end with status 2. ``python`` with prompts is a doctest. A
+block whose first line is ``# name.ext`` is saved as that file.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ def run_page(page: Path) -> int:
     for language, block in _BLOCK.findall(page.read_text(encoding="utf-8")):
         if language == "console":
             for command, expected in _commands(block):
-                _check(page, command, expected, _run(command))
+                refused = expected.startswith(("gp-labeler: ", "gp-core: "))
+                _check(page, command, expected, _run(command, status=2 if refused else 0))
                 count += 1
         elif language == "python":
             test = doctest.DocTestParser().get_doctest(block, names, page.name, str(page), 0)
@@ -50,19 +52,19 @@ def _commands(block: str) -> Iterator[tuple[str, str]]:
         yield command, expected
 
 
-def _run(command: str) -> str:
+def _run(command: str, *, status: int) -> str:
     """Run a command, that of the core in this process, and return what it prints."""
     program, *words = shlex.split(command)
     if program == "gp-labeler":  # the window has a process of its own
         command_line = [sys.executable, "-m", "gp_labeler", *words]
         done = subprocess.run(command_line, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, f"{command}: {done.stderr}{done.stdout}"
-        return done.stdout
+        assert done.returncode == status, f"{command}: {done.stderr}{done.stdout}"
+        return done.stdout + (done.stderr if status else "")
     assert program == "gp-core", f"{command}: no program of ours"
     told = io.StringIO()
-    with contextlib.redirect_stdout(told):
-        status = gp_core.cli.main(words)
-    assert status == 0, f"{command}: status {status}"
+    with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
+        found = gp_core.cli.main(words)
+    assert found == status, f"{command}: status {found}"
     return told.getvalue()
 
 
