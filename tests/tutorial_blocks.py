@@ -1,8 +1,8 @@
 """Run the code blocks of a page as a reader would, one after the other, in an empty folder.
 
-``console``: what follows ``$`` is run, and must print what stands below it (``...`` is anything); where that is
-the line of an error, such as ``gp-core: …``, it must end with status 2. ``python`` with prompts is a doctest. A
-block whose first line is ``# name.ext`` is saved as that file.
+``console``: what follows ``$`` is run, and must print what stands below it (``...`` is anything); where that
+is the line of an error, such as ``gp-core: …``, it must end with status 2. ``python`` with prompts is a
+doctest. A block whose first line is ``# name.ext`` is saved as that file.
 """
 
 from __future__ import annotations

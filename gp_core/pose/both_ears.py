@@ -102,11 +102,23 @@ class EarCheck:
     def text(self) -> str:
         """The check in a sentence."""
         word = "agree" if self.agrees else "DISAGREE"
+        limits = (
+            f"{self.expected_mm:.2f} mm, {self.expected_deg:.1f} deg and {self.expected_residual_mm:.2f} mm"
+        )
         return (
-            f"the two ears {word}: CO {self.origin_mm:.2f} mm and axis {self.axis_deg:.1f} deg from the "
-            f"mirror image of the other (within {self.expected_mm:.2f} mm, {self.expected_deg:.1f} deg), "
-            f"pairs {self.plane.residual_mm:.2f} mm (within {self.expected_residual_mm:.2f} mm); "
+            f"the two ears {word}: CO {self.origin_mm:.2f} mm, axis {self.axis_deg:.1f} deg and touches "
+            f"{self.plane.residual_mm:.2f} mm from the mirror image of the other (within {limits}); "
             f"mid-plane from {', '.join(self.plane.codes)}{self._of_suspects()}"
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do where the ears disagree."""
+        if self.suspects:
+            return f"Touch {self.suspects[0]} again on both ears."
+        return (
+            "Check sides and names. If head and reference moved between the ears, clear the touches of the "
+            "other ear."
         )
 
     def _of_suspects(self) -> str:

@@ -32,6 +32,7 @@ _WAYS = {
     "placed": "touches placed on it",
     "known": "a registration given with the touches",
 }
+_WITHHELD = "Until they agree, nothing is sent to a robot, and no file for a robot is written."
 _GOOD, _BAD, _QUIET, _RULE = "#1b7f4b", "#b3361f", "#5d6670", "#d5dae0"
 _TABLE = '<table cellspacing="0" cellpadding="0" style="margin-left: 0px; margin-right: 0px">'
 _BAR_PX, _BAR_MM = 80, 2.0
@@ -131,8 +132,10 @@ class PoseReport:
             return f'<p style="color:{_BAD}">{escape(text)}</p>'
         pose = self.estimate.poses.get("robust")
         joined = pose is not None and pose.of_both_ears
+        check = self.ears.comparison.check
         text = "; ".join(self.ears.comparison.texts) + ("; the axis is that of both ears" if joined else "")
-        colour = "" if self.ears.comparison.check.agrees else f' style="color:{_BAD}"'
+        text += "" if check.agrees else f". {check.remedy} {_WITHHELD}"
+        colour = "" if check.agrees else f' style="color:{_BAD}"'
         return f"<p{colour}>{escape(text[:1].upper() + text[1:])}</p>"
 
     def _rows(self) -> Iterator[tuple[str, list[str]]]:

@@ -121,6 +121,9 @@ def test_ears_that_disagree_hold_the_pose_back_from_files_and_robots(workspace, 
         workspace.pose.export(tmp_path / "pose.tfm")
     read = read_pose(workspace.pose.export(tmp_path / "pose.json"))
     assert read.ears_disagree
+    page = PoseReport(workspace.document.state, workspace.pose.estimate, ears=workspace.pose.ears).html()
+    assert "The two ears DISAGREE" in page
+    assert "Touch RWP again on both ears. Until they agree, nothing is sent to a robot" in page
     assert estimate_again(read).as_dict() == read.as_dict()
     workspace.pose.record_verdict("accept", by="AB")
     sending, held = PoseSending(), []

@@ -126,7 +126,7 @@ def ear_notices(ears: BothEars | None, *, wanted: bool) -> Iterator[tuple[str, .
     else:
         alone = " Until they agree, nothing is sent to a robot"
         alone += ", and the axis is that of this ear alone." if wanted else "."
-        yield ("warning", f"The two ears disagree: {_difference(check, apart)}.", _ear_remedy(check) + alone)
+        yield ("warning", f"The two ears disagree: {_difference(check, apart)}.", check.remedy + alone)
     if link is not None and link.has_moved:
         yield ("warning", sentence(link.text), "Fix the head or its marker before the next touches.")
 
@@ -144,15 +144,6 @@ def _difference(check: EarCheck, apart: str) -> str:
         return apart
     far, limit = check.plane.residual_mm, check.expected_residual_mm
     return f"their touches are {fine_mm(far)} from being mirror images (expected: up to {fine_mm(limit)})"
-
-
-def _ear_remedy(check: EarCheck) -> str:
-    if check.suspects:
-        return f"Touch {check.suspects[0]} again on both ears."
-    return (
-        "Check sides and names. If head and reference moved between the ears, clear the touches of the other "
-        "ear."
-    )
 
 
 def likely_text(probability: float) -> str:
