@@ -59,7 +59,7 @@ def main() -> None:
     heads = [draw_animal(perturbed_atlas(Atlas.published(), rng=rng), rng=rng) for _ in range(args.n)]
     ears = [with_cochlea_origin(head.side("LR"[i % 2])) for i, head in enumerate(heads)]
     for noise in args.noise:
-        print(f"{noise:g} mm a coordinate, {args.n} animals")
+        print(f"{noise:g} mm per coordinate, {args.n} animals")
         once: FloatArray | None = None
         for words, times in DESIGNS.items():
             rows = np.array([estimated(ear, times, noise, args.seed + i) for i, ear in enumerate(ears)])

@@ -1,7 +1,7 @@
 """How often the 95 % region of a ghost holds its feature, while simulated users accept, confirm and correct.
 
 Each user places three features of a drawn animal, then takes the others in the order that is proposed,
-seeing each with an error of 0.1 mm a coordinate. At every step all ghosts are accepted. The next is
+seeing each with an error of 0.1 mm per coordinate. At every step all ghosts are accepted. The next is
 confirmed where it lies within 0.3 mm of where the user sees the feature; else the feature is placed there.
 So points are confirmed *because* they lie near their ghost, and each is as far off as its ghost was.
 

@@ -163,7 +163,7 @@ def _mean(aligned: FloatArray, weights: FloatArray | None) -> FloatArray:
 
 
 def _variances(deviations: FloatArray, placed: NDArray[np.bool_], weights: FloatArray | None) -> FloatArray:
-    """Return the variance (n,) of each feature, mm^2 a coordinate."""
+    """Return the variance (n,) of each feature, mm^2 per coordinate."""
     if weights is None:
         variances: FloatArray = np.nansum(deviations**2, axis=(0, 2)) / (
             3 * np.maximum(placed.sum(axis=0) - 1, 1)

@@ -93,7 +93,7 @@ class Deviation:
     n_sd : float
         The distance in standard deviations (Mahalanobis).
     labelling_sd : float
-        Error of the label itself that these allow for, mm a coordinate.
+        Error of the label itself that these allow for, mm per coordinate.
     """
 
     code: str
@@ -394,7 +394,7 @@ def deviation(
     covariance : (3, 3) array, mm^2
         Of the predicted position.
     labelling_sd : float
-        Standard deviation of the label itself, mm a coordinate.
+        Standard deviation of the label itself, mm per coordinate.
 
     Returns
     -------

@@ -26,7 +26,7 @@ from gp_core.validation import FloatArray
 __all__ = ["LabelHypothesis", "LabelModel", "LeaveOneOut", "best_hypothesis"]
 
 WRONG_MM = 5.0
-"""Scale of an outlier's error, mm a coordinate: the label lies elsewhere in the ear."""
+"""Scale of an outlier's error, mm per coordinate: the label lies elsewhere in the ear."""
 
 EXCHANGE_ODDS = 0.01
 """Prior odds that two names of a side are exchanged, divided among its pairs."""
@@ -300,7 +300,7 @@ class LabelFit:
         Parameters
         ----------
         own_variances : (n,) array, mm^2
-            Variance of each label's own error, a coordinate.
+            Variance of each label's own error, mm^2 per coordinate.
 
         Returns
         -------

@@ -158,11 +158,6 @@ class PointList:
         """How far each point is."""
         return tuple(point.status for point in self.points)
 
-    @property
-    def descriptions(self) -> tuple[str, ...]:
-        """Free text of each point."""
-        return tuple(point.description for point in self.points)
-
 
 def labelled_point(
     label: str,

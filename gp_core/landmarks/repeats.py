@@ -19,10 +19,10 @@ _OUTLIER_SQUARED = 20.0
 """Squared Mahalanobis distance, chi-squared with 3 degrees of freedom: of ordinary touches, 1 in 6000."""
 
 _LEAST_SPREAD_MM = 0.1
-"""Smallest standard deviation assumed for a repeated touch, mm a coordinate."""
+"""Smallest standard deviation assumed for a repeated touch, mm per coordinate."""
 
 _APART_MM = 2.5
-"""Distance of two touches of one feature that ordinary ones of 0.4 mm a coordinate hardly ever have."""
+"""Distance of two touches of one feature that ordinary ones of 0.4 mm per coordinate hardly ever have."""
 
 _PRIOR_SPREAD_MM = 0.25
 """What one touch more, of this spread, says beforehand: two repeats alone hardly determine it."""
@@ -131,7 +131,7 @@ def repeat_noise(repeats: Mapping[str, RepeatedTouches]) -> float:
     Returns
     -------
     float
-        mm a coordinate; 0 where no feature has two touches that are used.
+        mm per coordinate; 0 where no feature has two touches that are used.
     """
     freedom = 3 * sum(one.n_used - 1 for one in repeats.values())
     squares = sum(one.n_used * one.spread_mm**2 for one in repeats.values())
@@ -183,7 +183,7 @@ def _several(points: ArrayLike, name: str) -> FloatArray:
 
 
 def _pooled_variance(repeats: list[FloatArray]) -> float:
-    """Return the variance of a touch, mm^2 a coordinate; a wrong touch hardly changes it."""
+    """Return the variance of a touch, mm^2 per coordinate; a wrong touch hardly changes it."""
     squares = [_PRIOR_SPREAD_MM**2 * 3.0]
     for points in repeats:
         middle = np.median(points, axis=0)

@@ -42,14 +42,14 @@ __all__ = [
 ]
 
 _ASYMMETRY_MM, _RESIDUAL_FACTOR = 0.3, 1.5
-"""How much the two sides of a head differ, mm a coordinate; factor by which pairs may exceed that."""
+"""How much the two sides of a head differ, mm per coordinate; factor by which pairs may exceed that."""
 
 _CORRELATION = 0.6
 """Of the errors of the two axes: both ears of an animal differ from the atlas in much the same way."""
 
 _PAIR_ASYMMETRY, _PLANE_ERROR_MM = 1.5, 0.1
 """Variance of a pair over that of its feature between animals, as the authors' animals have it; error of the
-plane of the other pairs at a pair, mm a coordinate."""
+plane of the other pairs at a pair, mm per coordinate."""
 
 _PAIR_SQUARED = 16.3
 """Squared Mahalanobis distance of a pair from being mirror images; 1 ordinary pair of 1000 exceeds it."""

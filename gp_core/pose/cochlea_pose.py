@@ -58,7 +58,7 @@ class CochleaPose:
     warnings : tuple of str
         What the user should know before using the pose.
     probe_noise : float or None
-        Scale of the touch errors that was estimated or given, mm a coordinate.
+        Scale of the touch errors that was estimated or given, mm per coordinate.
     T_touches_atlas : RigidTransform or None
         The registered atlas, for a left side; for a right side, from the atlas mirrored in x.
     round_window : str

@@ -70,7 +70,7 @@ def estimate_pose(
     specimens : sequence of Specimen, optional
         Labelled animals.
     probe_noise : float, optional
-        Scale of an ordinary touch error, mm a coordinate; by default estimated from the touches.
+        Scale of an ordinary touch error, mm per coordinate; by default estimated from the touches.
     round_window : {"touched", "expected"}
         What y of the frame points to: the middle of the touched RWA and RWP, as for the authors' robot, where
         both are touched and fit; or that of the fitted atlas, which is more accurate where touches are rough.
@@ -260,7 +260,7 @@ class EstimatorInput:
     specimens : sequence of Specimen or None
         Labelled animals, for ``jrmpc`` alone: the others get an atlas that was fitted to them.
     probe_noise : float or None
-        Scale of an ordinary touch error, mm a coordinate, where it is known.
+        Scale of an ordinary touch error, mm per coordinate, where it is known.
     shared_error : float
         RMS length of the offset common to all touches, mm.
     times : mapping of str to float, or None

@@ -21,7 +21,7 @@ FEWEST_PAIRS = 3
 """So many features must be touched on both sides for a mid-plane."""
 
 _PAIR_SD_MM = 0.5
-"""Standard deviation by which the two sides of a head differ in a touched feature, mm a coordinate."""
+"""Standard deviation by which the two sides of a head differ in a touched feature, mm per coordinate."""
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ def gains(
     atlas : Atlas
         Mean shape and its variation.
     probe_noise : float, optional
-        Scale of an ordinary touch error, mm a coordinate; by default estimated from the touches.
+        Scale of an ordinary touch error, mm per coordinate; by default estimated from the touches.
     shared_error : float
         As for `gp_core.pose.estimate.estimate_pose`, mm.
 

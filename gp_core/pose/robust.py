@@ -66,7 +66,7 @@ def estimate_robust(
     atlas : Atlas
         Mean shape and its variation.
     probe_noise : float, optional
-        Scale of an ordinary touch error, mm a coordinate; by default estimated from the touches.
+        Scale of an ordinary touch error, mm per coordinate; by default estimated from the touches.
     shared_error : float
         RMS length of one offset that all touches share, mm; see `gp_core.pose.systematic_error`.
     times : mapping of str to float, optional
@@ -181,7 +181,7 @@ def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -
     atlas : Atlas
         Mean shape and its variation.
     probe_noise : float or None
-        Scale of an ordinary touch error, mm a coordinate; None: to be estimated.
+        Scale of an ordinary touch error, mm per coordinate; None: to be estimated.
 
     Returns
     -------

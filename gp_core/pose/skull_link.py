@@ -20,7 +20,7 @@ _BY_CHANCE = 0.01
 """So rarely do skull features that have not moved lie as far apart as ones that have."""
 
 _LEAST_NOISE_MM = 0.1
-"""Noise of a touch that is assumed at least, mm a coordinate: a few features may fit better by chance."""
+"""Noise of a touch that is assumed at least, mm per coordinate: a few features may fit better by chance."""
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ _ENOUGH_FOR_DRIFT = 5
 """Number of touches from which on a drift can be distinguished from an unusual animal."""
 
 _FLOOR_MM = {3: 0.2, 4: 0.15}
-"""Smallest noise assumed, mm a coordinate: so few touches leave too few residuals to estimate it."""
+"""Smallest noise assumed, mm per coordinate: so few touches leave too few residuals to estimate it."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class SystematicError:
         Returns
         -------
         float
-            Noise, mm a coordinate.
+            Noise, mm per coordinate.
         """
         return _FLOOR_MM.get(n_touches, 0.0) if self.shared_error > 0 else 0.0
 

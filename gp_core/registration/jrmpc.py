@@ -98,7 +98,7 @@ class JrmpcResult:
     centres : (K, 3) array
         Centres of the Gaussians, mm.
     variances : (K,) array
-        Their variances a coordinate, mm².
+        Their variances, mm² per coordinate.
     objective : (n_iterations,) array
         Negative log-likelihood of all points (up to a constant) before each iteration. With epsilon 0 it
         never rises.

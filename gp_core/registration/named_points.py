@@ -83,11 +83,11 @@ class TouchModel:
     variances : (n,) array, mm^2
         Variance between animals of one coordinate of each feature.
     noise : float or None
-        Scale of the touch errors, mm a coordinate; None: estimated with the pose.
+        Scale of the touch errors, mm per coordinate; None: estimated with the pose.
     counts : (n,) array or None
         Of how many touches each point is the mean; None: one each.
     repeat_noise : float
-        Standard deviation of one touch as repeated touches show it, mm a coordinate; 0 without repeats. It
+        Standard deviation of one touch as repeated touches show it, mm per coordinate; 0 without repeats. It
         bounds the noise of the 95 % region from below.
     """
 
@@ -147,7 +147,7 @@ class LeaveOneOutResiduals:
 
     @property
     def error_variance(self) -> FloatArray:
-        """(n,) error variance that would make the deviation of each touch average, mm^2 a coordinate."""
+        """(n,) error variance that would make the deviation of each touch average, mm^2 per coordinate."""
         variance = self.touch_variances.copy()
         for _ in range(_NEWTON_STEPS):
             spread = self.variances + variance[:, None]
@@ -244,7 +244,7 @@ class NamedFit:
 
     @cached_property
     def touch_variances(self) -> FloatArray:
-        """(n,) variance of each touch, mm^2 a coordinate.
+        """(n,) variance of each touch, mm^2 per coordinate.
 
         The variance of a Student-t exceeds its squared scale, and a scale estimated from few touches is
         itself uncertain.
@@ -357,7 +357,7 @@ def gaussian_deviance(model: TouchModel, touches: FloatArray, noise: float) -> f
     touches : (n, 3) array, mm
         Row j is feature j of the model.
     noise : float
-        Scale of the touch errors, mm a coordinate.
+        Scale of the touch errors, mm per coordinate.
 
     Returns
     -------

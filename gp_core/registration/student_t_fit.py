@@ -33,7 +33,7 @@ Vector: TypeAlias = tuple[float, float, float]
 Symmetric3: TypeAlias = tuple[float, float, float, float, float, float]
 
 TYPICAL_NOISE_MM = 0.05
-"""Scale of a careful touch, mm a coordinate: the prior of sigma."""
+"""Scale of a careful touch, mm per coordinate: the prior of sigma."""
 
 NU = 4.0
 """Degrees of freedom of a touch error."""
@@ -73,7 +73,7 @@ def fit_student_t(
     mean, touches : (3 n,)
         Mean of the atlas, and the touches, mm.
     variances : (n,)
-        Variances of the features between animals, mm^2 a coordinate.
+        Variances of the features between animals, mm^2 per coordinate.
     counts : (n,)
         Of how many touches each one is the mean: the squared scale of its error is that much smaller.
     weights : (n,)

@@ -44,7 +44,7 @@ class Condition:
     Attributes
     ----------
     noise_mm : float
-        Standard deviation of the Gaussian noise, mm a coordinate.
+        Standard deviation of the Gaussian noise, mm per coordinate.
     mistouch_mm : float
         Error of one touch, mm.
     """

@@ -46,7 +46,7 @@ class SimulationReport:
     settings : JrmpcSettings or None
         Of ``jrmpc``.
     noise : float
-        Standard deviation of the touch errors, mm a coordinate.
+        Standard deviation of the touch errors, mm per coordinate.
     errors : dict of str to PoseErrors
         By side, ``L`` and ``R``.
     """
@@ -139,7 +139,7 @@ def simulate(
     settings : JrmpcSettings
         Of ``jrmpc``, and of the registration that the scatter is taken from.
     noise : float
-        Standard deviation of the touch errors, mm a coordinate.
+        Standard deviation of the touch errors, mm per coordinate.
     executor : concurrent.futures.Executor, optional
         Runs the estimates; the result does not depend on it.
 

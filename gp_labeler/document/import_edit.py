@@ -121,7 +121,7 @@ class ImportLandmarks:
         )
 
     def _told(self, about: LabelProvenance) -> Provenance:
-        """Return the provenance of a point whose file says no more than who placed it, and when."""
+        """Return the provenance of a point whose file states only who placed it, and when."""
         if not about.observer:
             return self.provenance
         return replace(self.provenance, by=about.observer, time=about.time or self.provenance.time)

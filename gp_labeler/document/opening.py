@@ -1,4 +1,4 @@
-"""What a document can be loaded with: a new specimen, a specimen file, or what a killed program left."""
+"""What a document can be loaded with: a new specimen, a specimen file, or recovered edits."""
 
 from __future__ import annotations
 

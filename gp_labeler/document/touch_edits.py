@@ -101,7 +101,7 @@ class RemoveTouches:
 
 @dataclass(frozen=True)
 class LeaveOutTouch:
-    """Let the estimate do without a touch, or take it in again."""
+    """Exclude a touch from the estimate, or include it again."""
 
     do: ClassVar[str] = "leave_out_touch"
     side: Side

@@ -1,4 +1,4 @@
-"""Points touched with a probe, as a specimen keeps them: one value a touch, and a set of them a side.
+"""Points touched with a probe, as a specimen keeps them: one value for each touch, one set for each side.
 
 Touches of one side share a frame: the tracker's, or the scan's for a dry run on the mesh. They are addressed
 by side and name: an external feature, or a skull feature (``S1``, ``S2``, ...) that serves the registration.

@@ -135,7 +135,7 @@ def misnamed_files(document: SpecimenDocument, side: Side) -> tuple[str, ...]:
 
 
 def leave_out(document: SpecimenDocument, side: Side | str, name: str, left_out: bool = True) -> bool:
-    """Let the estimate do without a touch, or take it in again."""
+    """Exclude a touch from the estimate, or include it again."""
     return document.do(LeaveOutTouch(Side.parse(side), name, left_out))
 
 

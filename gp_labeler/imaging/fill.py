@@ -1,4 +1,4 @@
-"""Values that stand where a scanner measured nothing: outside its circle, in lost slices."""
+"""Fill values: what a file holds where the scanner measured nothing: outside its circle, in lost slices."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _ONCE, _ALIKE = 0.97, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Fill:
-    """One value that stands for nothing.
+    """A fill value, which marks voxels that were not measured.
 
     Parameters
     ----------
     value : float
-        The value; NaN stands for all that are not finite.
+        The value; NaN for all that are not finite.
     outside : (y, x) bool array, optional
-        Where in every slice it stands for nothing; None: everywhere.
+        Where in every slice it marks unmeasured pixels; None: everywhere.
     """
 
     value: float
@@ -61,7 +61,7 @@ class Fill:
 
 
 def find_fill(array: _Array, known: float | None = None, *, sampled: bool = False) -> tuple[Fill, ...]:
-    """Find the values of a (z, y, x) scan that stand for nothing; the file may say one that does.
+    """Find the fill values of a (z, y, x) scan; the file may state one.
 
     `sampled` looks for values that are not finite in some slices only, as for all others, so that a scan is
     not read as a whole.
@@ -90,7 +90,7 @@ def find_fill(array: _Array, known: float | None = None, *, sampled: bool = Fals
 
 @dataclass(frozen=True)
 class Replacement:
-    """What stands where nothing was measured.
+    """What replaces the fill value of a scan.
 
     Parameters
     ----------

@@ -177,12 +177,6 @@ class Surface:
         mesh = joined(kept, part_outside(cut, self.T_voxel_scan, region)) if through.any() else kept
         return Surface(poly_data(mesh), self.level, self.T_voxel_scan, self.region, self.stride)
 
-    def only(self, kept: NDArray[np.bool_]) -> Surface:
-        """Return the surface of some of the triangles, (T,) bool, and of the points they use."""
-        return Surface(
-            poly_data(_subset(self.mesh, kept)), self.level, self.T_voxel_scan, self.region, self.stride
-        )
-
     def drop_parts(self, *, smallest_mm: float, largest: int | None = None) -> None:
         """Drop small parts from the mesh itself, which nobody else may use yet: no copy is made of it.
 

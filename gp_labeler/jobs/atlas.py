@@ -1,4 +1,4 @@
-"""Long work on atlases, as frozen jobs: reading one, fitting one to labelled animals, trying it out."""
+"""Jobs on atlases: reading one, fitting one to labelled animals, leave-one-out."""
 
 from __future__ import annotations
 

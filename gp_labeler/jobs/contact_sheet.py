@@ -172,7 +172,7 @@ class MakeContactSheets:
 
 
 class _NothingMadeError(Exception):
-    """So that no empty file is left."""
+    """Raised where nothing was drawn, so that no empty file remains."""
 
 
 def _require(n_made: int, problems: list[str]) -> None:

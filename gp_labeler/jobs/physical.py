@@ -1,4 +1,4 @@
-"""The paper's physical test as a job: a touched skull compared with its own labelled scan."""
+"""The job of the paper's physical test: a touched skull compared with its own labelled scan."""
 
 from __future__ import annotations
 

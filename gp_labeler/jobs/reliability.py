@@ -1,4 +1,4 @@
-"""Measuring how repeatable labels are, as a frozen job."""
+"""The job that measures how repeatable labels are."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def phantom_seed(name: str) -> int | None:
 
 @dataclass(frozen=True)
 class MakeDemo:
-    """Make the phantom: a synthetic head of a guinea pig that never lived."""
+    """Make the phantom: the synthetic head of a simulated guinea pig."""
 
     seed: int = 0
     spacing: float = 0.2

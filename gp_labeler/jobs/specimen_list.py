@@ -1,4 +1,4 @@
-"""Work on many specimens, as frozen jobs: listing them, counting doubtful labels, exporting."""
+"""Jobs on many specimens: listing them, counting doubtful labels, exporting."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Meshes of others, drawn with the bone: no part of the specimen."""
+"""Meshes that a user draws with the bone; they are no part of the specimen."""
 
 from __future__ import annotations
 

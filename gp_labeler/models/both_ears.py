@@ -21,7 +21,7 @@ _METHOD = "robust"
 
 @dataclass(frozen=True, eq=False)
 class BothEars:
-    """What the two ears of a specimen say of each other.
+    """How the estimates of the two ears of a specimen agree.
 
     Parameters
     ----------

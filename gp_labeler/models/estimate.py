@@ -58,7 +58,7 @@ class EstimateSettings:
     methods : tuple of str
         ``robust``, ``jrmpc`` or both; the first is the one that is told and exported.
     probe_noise : float, optional
-        Scale of an ordinary touch error, mm a coordinate; None: found from the touches.
+        Scale of an ordinary touch error, mm per coordinate; None: found from the touches.
     registration : str
         By what touches are registered to the scan: ``features`` labelled and touched, ``skull`` features, or
         ``auto``, the skull's where there are enough.

@@ -30,7 +30,7 @@ N_FOR_GHOSTS = 3
 N_REMEMBERED = 24
 
 MIRROR_ASYMMETRY = 0.9
-"""2 (1 - r), where r is how alike the two ears of an animal are in what sets them apart from the mean: 0.5 on
+"""2 (1 - r), where r is the correlation of the deviations of the two ears of an animal from the mean: 0.5 on
 average over the features of the authors' eleven animals, 0.6 on drawn ones."""
 
 MIRROR_TILT = 0.04
@@ -109,7 +109,7 @@ class Expectations:
         return found
 
     def _recalled(self, key: tuple[object, ...]) -> Mapping[str, Any] | None:
-        """Return what is remembered, which is then forgotten last: a side at rest stays known."""
+        """Return a remembered result, and mark it as the latest used: an unchanged side stays known."""
         with self._lock:
             found = self._known.pop(key, None)
             if found is not None:
@@ -183,7 +183,7 @@ def mirror_ghosts(
 
 @cache
 def _side_variance(code: str) -> float:
-    """Return how much a feature differs between the two ears of an animal, mm^2 a coordinate."""
+    """Return how much a feature differs between the two ears of an animal, mm^2 per coordinate."""
     published = Atlas.published()
     codes = (code,) if code in published.codes else DEFINING_FEATURES  # CO is computed from these
     return MIRROR_ASYMMETRY * float(published.variances(codes).mean())

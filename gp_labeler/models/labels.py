@@ -150,7 +150,7 @@ class LabelsModel:
         return None if known is None else known.deviations
 
     def checking(self, side: Side) -> CheckLabels:
-        """Return the job that checks one side as it stands, for `point_states` to know its problems."""
+        """Return the job that checks one side as it stands, after which `point_states` knows its problems."""
         return CheckLabels(self._checks, self.document.landmarks(side))
 
     def point_states(self, side: Side, *, wait: bool = True) -> dict[str, PointState]:

@@ -172,7 +172,7 @@ class PoseModel:
 
     @property
     def waiting_text(self) -> str:
-        """What is still wanting for an estimate, in words; empty where there is one."""
+        """What is missing for an estimate, in words; empty where there is one."""
         return self._estimator.waiting_text(self._document.state)
 
     @property
@@ -186,7 +186,7 @@ class PoseModel:
         self._on_changed()
 
     def set_registration(self, side: Side, T_scan_tracker: RigidTransform | None) -> None:
-        """Say how the tracker lies to the scan, where that is known otherwise than from points."""
+        """Set the registration of a side, where it is known otherwise than from points; None removes it."""
         self._estimator.set_registration(side, T_scan_tracker)
         self._on_changed()
 

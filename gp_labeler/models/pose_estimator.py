@@ -38,7 +38,7 @@ class _Made:
     estimate: SideEstimate | None
 
     def is_of(self, state: SpecimenState, chosen: EstimateSettings, side: Side) -> bool:
-        """Whether nothing at all changed; asked dozens of times a touch."""
+        """Whether nothing has changed; asked dozens of times for each touch."""
         return self.state is state and self.chosen is chosen and self.side is side
 
 
@@ -97,19 +97,19 @@ class PoseEstimator:
         self.joint_ready, self._made = True, {}
 
     def set_registration(self, side: Side, T_scan_tracker: RigidTransform | None) -> None:
-        """Say how the tracker lies to the scan, where that is known otherwise than from points."""
+        """Set the registration of a side, where it is known otherwise than from points; None removes it."""
         self._known.pop(side, None)
         if T_scan_tracker is not None:
             self._known[side] = T_scan_tracker
         self._made = {}
 
     def forget_registrations(self) -> None:
-        """Forget how the tracker lies to the scan: it is another scan."""
+        """Forget all registrations: another scan was opened."""
         self._known.clear()
         self._made = {}
 
     def waiting_text(self, state: SpecimenState) -> str:
-        """Return what is still wanting for an estimate, in words; empty where there is one."""
+        """Return what is missing for an estimate, in words; empty where there is one."""
         n = len(state.touched(self.settings.side).placed)
         if n < FEWEST_TOUCHES:
             more = FEWEST_TOUCHES - n

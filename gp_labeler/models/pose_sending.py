@@ -1,4 +1,4 @@
-"""The estimated pose on its way to a robot: what is sent, and what holds it back."""
+"""Sending the estimated pose to a robot: what is sent, and what prevents it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["PoseSending"]
 
 
 class PoseSending:
-    """Sends the pose while nothing speaks against it, and otherwise sends what does."""
+    """Sends the pose while the gate allows it, and otherwise the reasons why not."""
 
     changed = Signal()
     """Whether it sends, to whom, or what holds the pose back changed."""
@@ -33,7 +33,7 @@ class PoseSending:
 
     @property
     def words(self) -> str:
-        """How it stands, for a person; empty where nothing is sent."""
+        """The state of the sending, as a sentence; empty where nothing is sent."""
         if self._sender is None:
             return ""
         return (
@@ -65,7 +65,7 @@ class PoseSending:
         reference_age_s: float | None,
         file_warnings: tuple[GateReason, ...] = (),
     ) -> None:
-        """Send how the pose stands now.
+        """Send the current pose, or why it must not be used.
 
         Parameters
         ----------

@@ -98,12 +98,12 @@ class TrackerModel:
 
     @property
     def phase(self) -> LinkPhase:
-        """How the link stands."""
+        """The state of the link."""
         return LinkPhase.OFF if self._link is None else self._link.state.phase
 
     @property
     def words(self) -> str:
-        """How it stands, for a person."""
+        """The state of the link, as a sentence."""
         return "Not connected." if self._link is None else self._link.state.words
 
     @property
@@ -125,7 +125,7 @@ class TrackerModel:
         return self._limits.frozen_s is None
 
     def set_may_stand_still(self, may: bool) -> None:
-        """Believe a marker that stands still to the last digit, or not; from the next message on."""
+        """Accept a marker that stands still to the last digit, or not, from the next message on."""
         self._limits = replace(self._limits, frozen_s=None if may else Limits().frozen_s)
         if self._link is not None:
             self._link.set_limits(self._limits)
@@ -324,7 +324,7 @@ class TrackerModel:
 
     @property
     def sending(self) -> str:
-        """How the sending of the pose stands, for a person; empty where nothing is sent."""
+        """The state of the sending, as a sentence; empty where nothing is sent."""
         return self._sending.words
 
     @property

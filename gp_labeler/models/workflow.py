@@ -33,7 +33,7 @@ GhostsOf = Callable[[Side], Mapping[str, Ghost]]
 
 
 class PointState(str, Enum):
-    """How far a point is, as the table shows it."""
+    """The state of a point, as the table shows it."""
 
     TO_DO = "to do"
     GHOST = "ghost"
@@ -87,7 +87,7 @@ def point_state(
     ghosts: Mapping[str, Ghost],
     problems: Mapping[str, Finding],
 ) -> PointState:
-    """Return how far a point is; a point that a person checked counts as sound."""
+    """Return the state of a point; one that a person has checked has no problem."""
     if feature(code).computed:
         return PointState.COMPUTED if code in state.side(side) else PointState.TO_DO
     landmark = state.landmark(side, code)

@@ -1,4 +1,4 @@
-"""Datasets of whoever knows pyvista, drawn with the bone: `Scene3D.add_mesh`."""
+"""Datasets of pyvista that a user draws with the bone: `Scene3D.add_mesh`."""
 
 from __future__ import annotations
 

@@ -164,7 +164,7 @@ class BoneFrameCache:
         self._target.restore(self._kept)
 
     def forget(self) -> None:
-        """Take it that no picture is kept any more."""
+        """Drop the picture that is kept."""
         self._shown = self._work = self._work_for = None
         self._fine, self._warm = False, -1
 

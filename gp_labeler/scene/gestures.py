@@ -100,11 +100,6 @@ class CameraControl:
         self._camera = camera
         self._gesture = _Gesture()
 
-    @property
-    def dragging(self) -> bool:
-        """Whether a button is down and the mouse has moved: time to draw quickly rather than finely."""
-        return self._gesture.drag is not DragMode.NONE and not self._gesture.is_click
-
     def press(self, button: Button, x: float, y: float, modifiers: Modifier = Modifier.NONE) -> None:
         """Take a press of a button."""
         self._gesture.begin(drag_of(button, modifiers), x, y)

@@ -1,4 +1,4 @@
-"""From where an estimated cochlea is looked at: along its axis, and through the round window."""
+"""Camera positions that show an estimated cochlea: along its axis, and through the round window."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class CameraPlacement:
 
 
 def along_axis(pose: DrawnPose) -> CameraPlacement:
-    """Look from without the apex down the modiolar axis, CO in the middle and the round window up."""
+    """Look at the apex from outside, along the modiolar axis; CO is in the middle, the round window up."""
     return CameraPlacement(-pose.axis, pose.towards_window, pose.origin)
 
 
 def through_round_window(pose: DrawnPose) -> CameraPlacement:
-    """Look from without through the middle of the round window to CO, the top of the head up."""
+    """Look from outside through the middle of the round window to CO; the top of the head is up."""
     return CameraPlacement(-pose.towards_window, pose.up, pose.origin)
 
 

@@ -38,7 +38,7 @@ class Segment:
 
 
 class SegmentActor:
-    """Draws lines: full where they are seen, faint where bone hides them.
+    """Draws lines: opaque where they are visible, faint where bone hides them.
 
     Parameters
     ----------

@@ -105,7 +105,7 @@ def _placed(codes: list[str], side: Side, voxel_mm: float) -> Iterator[dict[str,
 
 
 def _order(side: Side) -> Iterator[str]:
-    """Yield those that open the atlas's eyes, then the others; what both sides share once."""
+    """Yield the features that the atlas needs to predict the others, then these; shared ones once."""
     codes = [row.code for row in FEATURES if not row.computed and not (row.shared and side is Side.RIGHT)]
     yield from OPENING
     yield from (code for code in codes if code not in OPENING)

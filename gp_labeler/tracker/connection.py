@@ -29,7 +29,7 @@ _JOIN_SECONDS = 0.25
 
 @dataclass(frozen=True)
 class Opened:
-    """The connection stands."""
+    """The connection is established."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Connection:
         return events
 
     def send(self, data: bytes) -> None:
-        """Send bytes, as soon as the connection stands."""
+        """Send bytes, as soon as the connection is established."""
         self._outgoing.put(data)
         self._waker.wake()
 

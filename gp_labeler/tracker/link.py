@@ -1,4 +1,4 @@
-"""The link to a tracker: polled for samples, and always able to say in words how it stands."""
+"""The link to a tracker: polled for samples; its state is always known, also as a sentence."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ _MOST_DEVICES = 100
 
 
 class LinkPhase(str, Enum):
-    """How a link stands."""
+    """The state of a link."""
 
     OFF = "off"
     CONNECTING = "connecting"
     CONNECTED = "connected"
     """Messages of the probe come; whether its marker is seen, each sample says."""
     SILENT = "silent"
-    """The connection stands, and no message of the probe comes."""
+    """Connected, but no message of the probe arrives."""
     LOST = "lost"
     """It is tried again by itself."""
 
 
 @dataclass(frozen=True)
 class LinkState:
-    """How a link stands, and that in words for a person."""
+    """The state of a link, and the same as a sentence."""
 
     phase: LinkPhase
     words: str

@@ -1,4 +1,4 @@
-"""What a robot is told of the pose: the transform while it may be used, and always how it stands.
+"""What a robot is told of the pose: the transform while it may be used, and always its state.
 
 Before the TRANSFORM go a STATUS message, whose code is 1 only while the pose may be used, and a STRING
 message with the same in JSON. Each has a device name of its own, for some clients keep one message a name.
@@ -23,7 +23,7 @@ from gp_labeler.tracker.messages import pack_transform
 __all__ = ["HELD_BACK", "NO_POSE", "STATE_DEVICE", "STATUS_DEVICE", "PoseMessage"]
 
 STATE_DEVICE, STATUS_DEVICE = "CochleaPoseState", "CochleaPoseStatus"
-"""Device names of the STRING and of the STATUS message, which say how the pose stands."""
+"""Device names of the STRING and of the STATUS message, which carry the state of the pose."""
 
 HELD_BACK = "HELD_BACK"
 NO_POSE = "NO_POSE"

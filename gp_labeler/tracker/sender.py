@@ -1,4 +1,4 @@
-"""How the estimated pose stands, sent out over OpenIGTLink for a robot or for 3D Slicer."""
+"""Sends the estimated pose and its state over OpenIGTLink, to a robot or to 3D Slicer."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _STOPPED = GateReason("stopped", "sending was stopped")
 
 
 class PoseSender:
-    """Sends how the pose stands again and again, and the pose itself while it may be used.
+    """Sends the state of the pose repeatedly, and the pose itself while it may be used.
 
     It has a thread of its own. Where a message is to be renewed and is not, because the program hangs, it
     withdraws the pose by itself.
@@ -88,7 +88,7 @@ class PoseSender:
 
     @property
     def words(self) -> str:
-        """How it stands, for a person."""
+        """The state of the sending, as a sentence."""
         if self._connection is not None:
             return self._status
         to = "no client connected" if not self._peers else f"{self._peers} listening"

@@ -1,4 +1,4 @@
-"""A probe that does as it is told: where its marker and the head's are, with noise and mishaps."""
+"""A simulated probe: the poses of its marker and of the head's, with noise and faults."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class SimulatedProbe:
     tip_offset : (3,) array_like
         The tip in the marker's frame, mm.
     noise_mm, noise_deg : float
-        Standard deviation of a marker's position (a coordinate) and orientation (an axis).
+        Standard deviation of a marker's position (per coordinate) and orientation (per axis).
     sway_mm : float
         How far the head, and the reference on it, sways.
     reference : bool

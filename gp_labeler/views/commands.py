@@ -1,4 +1,4 @@
-"""The table of actions as Qt has it: menus with keys, and buttons that follow them."""
+"""The table of actions as `QAction`s: menus, shortcuts, and the buttons that follow them."""
 
 from __future__ import annotations
 

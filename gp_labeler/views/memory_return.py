@@ -1,4 +1,4 @@
-"""Memory that a scan or its meshes took goes back to the system a moment after they are gone."""
+"""Returns the memory of a scan or its meshes to the system soon after they are released."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From models to widgets: signals that are let go with the widget, and errors that are told."""
+"""From models to widgets: connections that end with the widget, and errors shown to the user."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def attempt(teller: Teller, action: Callable[[], object]) -> bool:
 
 @contextmanager
 def blocked(*objects: QObject) -> Iterator[None]:
-    """Change widgets without their telling of it."""
+    """Change widgets without their signals."""
     blockers = [QSignalBlocker(each) for each in objects]
     try:
         yield

@@ -16,7 +16,7 @@ _PERIOD_MS = 33
 
 
 class TrackerDisplay(QObject):
-    """The clock and the ears of a tracked probe.
+    """Polls the tracker, draws the tip, and beeps at every touch.
 
     Parameters
     ----------

@@ -24,7 +24,8 @@ if os.environ.get("GP_LABELER_CANVAS") == "native":  # before the application is
 
 
 _DRAWN = ("views", "scene", "scripting")
-"""Folders of tests that show or draw something; `scripting/test_leaks.py` looks at whole scripts."""
+"""Folders of tests that show or draw something; `scripting/test_leaks.py` looks at whole scripts. Elsewhere
+tests that do so ask for the application."""
 
 
 @pytest.hookimpl(wrapper=True)
@@ -41,7 +42,8 @@ def _is_checked(item: pytest.Item) -> bool:
     """Whether what a file leaves is looked for: with the usual binding and canvas, if nothing failed."""
     usual = qtpy.PYSIDE6 and os.environ.get("GP_LABELER_CANVAS") != "native"
     any_failed = bool(item.session.testsfailed)  # its traceback keeps what it showed
-    return usual and not any_failed and item.path.parent.name in _DRAWN and "qtpy.QtWidgets" in sys.modules
+    draws = item.path.parent.name in _DRAWN or "qapp" in getattr(item, "fixturenames", ())
+    return usual and not any_failed and draws and "qtpy.QtWidgets" in sys.modules
 
 
 class PatientBot(QtBot):

@@ -18,6 +18,7 @@ DIRECTIONS = {
 }
 MIDDLE = np.array([14.0, -8.0, 5.0])
 SPACING = np.array([0.2, 0.25, 0.3])
+BALL, RADIUS = MIDDLE + np.array([1.0, 0.5, -0.7]), 3.0
 
 
 def scan_of(balls: list[tuple[np.ndarray, float]], direction: np.ndarray, *, half_mm: float = 8.0) -> Volume:
@@ -29,3 +30,17 @@ def scan_of(balls: list[tuple[np.ndarray, float]], direction: np.ndarray, *, hal
     inside = np.max([r - np.linalg.norm(points - c, axis=-1) for c, r in balls], axis=0)
     values = (200 * np.clip(inside / 0.4 + 0.5, 0, 1)).astype(np.uint8)
     return Volume.from_parts(values, SPACING, origin, direction)
+
+
+def unlike_background(pixels: np.ndarray) -> np.ndarray:
+    """Where something is drawn: the background is a gentle gradient of one hue from top to bottom."""
+    background = pixels[:, :1].astype(int)
+    return np.abs(pixels.astype(int) - background).max(axis=2) > 25
+
+
+def coloured(pixels: np.ndarray, colour: str) -> np.ndarray:
+    """Where a hue prevails, however it is lit."""
+    wanted = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], float)
+    shown = pixels.astype(float)
+    cosine = shown @ wanted / np.maximum(np.linalg.norm(shown, axis=2) * np.linalg.norm(wanted), 1)
+    return (cosine > 0.985) & (shown.max(axis=2) > 70)

@@ -196,7 +196,7 @@ def _in_memory(plan: ImportPlan, report: Report) -> tuple[Voxels, float | None, 
 def _in_file(
     plan: ImportPlan, held: Mapped, report: Report, words: str
 ) -> tuple[Voxels, float | None, tuple[str, ...]]:
-    """Leave the voxels in their file; what stands for nothing is replaced whenever some are read.
+    """Leave the voxels in their file; fill values are replaced whenever some are read.
 
     All of them are read here only where some were not measured: their value has to be below all others.
     """

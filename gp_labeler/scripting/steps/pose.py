@@ -87,7 +87,7 @@ class EstimateStep(Step):
     features : text or texts
         What is touched in a simulation; by default the paper's six.
     noise : float
-        Standard deviation of a simulated touch, mm a coordinate.
+        Standard deviation of a simulated touch, mm per coordinate.
     seed : int
         Of the simulation.
     atlas : str, optional
@@ -98,7 +98,7 @@ class EstimateStep(Step):
     method : text or texts
         ``robust``, ``jrmpc`` or both; the first is the one that is told and written.
     probe_noise : float, optional
-        Ordinary error of a touch, mm a coordinate; by default found from the touches.
+        Ordinary error of a touch, mm per coordinate; by default found from the touches.
     shared_error : float
         RMS length of one offset that all touches share, mm; it widens the 95 % region.
     accept_warnings : bool

@@ -42,7 +42,7 @@ class Touches(Step):
     features : text or texts
         What is touched in a simulation; by default the paper's six.
     noise : float
-        Standard deviation of a simulated touch, mm a coordinate.
+        Standard deviation of a simulated touch, mm per coordinate.
     seed : int
         Of the simulation.
     how : str

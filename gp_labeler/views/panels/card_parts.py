@@ -67,7 +67,7 @@ class Segments(QWidget):
         return next((name for name, button in self.buttons.items() if button.isChecked()), "")
 
     def set_value(self, name: str) -> None:
-        """Show what is chosen, without telling of it."""
+        """Show what is chosen, without a signal."""
         with blocked(self._group):
             self.buttons[name].setChecked(True)
 

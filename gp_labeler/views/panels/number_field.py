@@ -46,7 +46,7 @@ class NumberField(QLineEdit):
         return self._value
 
     def set_value(self, value: float | None) -> None:
-        """Show a number, without telling of it; None shows an empty field."""
+        """Show a number without a signal; None shows an empty field."""
         self._value = 0.0 if value is None else value
         self.setText("" if value is None else self._words())
 

@@ -54,7 +54,7 @@ def text_label(words: str = "", role: str = "", *, wrap: bool = False) -> QLabel
 
 
 def emptied(layout: QLayout) -> None:
-    """Take everything out of a layout, and do away with it."""
+    """Take everything out of a layout, and delete it."""
     while (item := layout.takeAt(0)) is not None:
         widget = item.widget()
         if widget is not None:
@@ -268,7 +268,7 @@ class Facts(QWidget):
 
 
 def fix_headers(table: QTableView, *, stretched: int = 0) -> None:
-    """Let nobody resize the rows and columns of a table; one column takes the width that is left."""
+    """Fix the rows and columns of a table; one column takes the remaining width."""
     table.verticalHeader().hide()
     table.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
     header = table.horizontalHeader()

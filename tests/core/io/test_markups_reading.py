@@ -72,7 +72,7 @@ def test_stray_carriage_returns_and_crlf_and_a_byte_order_mark(file):
     content = json.dumps({"markups": [markup(point)]}, indent=1)
     file.write_bytes(b"\xef\xbb\xbf" + content.replace("\n", "\r\n").encode())
     points = read_points(file)
-    assert (points.labels, points.descriptions) == (("CA",), ("Fixed",))
+    assert [(point.label, point.description) for point in points.points] == [("CA", "Fixed")]
 
 
 def test_utf16_with_its_mark_is_read(file):

@@ -93,4 +93,4 @@ def test_the_written_table_is_slicers_with_one_column_more(file):
     header = file.read_text().splitlines()[0]
     assert header == "label,l,p,s,defined,selected,visible,locked,description,status"
     assert same_landmarks(read_landmarks(file), landmarks)
-    assert read_points(file).descriptions[0] == "Cochlea apex"
+    assert read_points(file).points[0].description == "Cochlea apex"

@@ -268,9 +268,10 @@ def test_what_a_user_can_do_wrong_is_said(tmp_path: Path) -> None:
         surface.save(tmp_path / "bone.off")
     with pytest.raises(GpError, match=r"bone.ply: cannot be written .*Check the folder"):
         surface.save(tmp_path / "nowhere" / "bone.ply")
+    empty = surface.outside(np.array([[-1e4] * 3, [1e4] * 3]))
     with pytest.raises(GeometryError, match="empty"):
-        surface.only(np.zeros(surface.n_triangles, bool)).project([0, 0, 0])
-    assert surface.only(np.zeros(surface.n_triangles, bool)).pick([0, 0, 0], [1, 0, 0]) is None
+        empty.project([0, 0, 0])
+    assert empty.pick([0, 0, 0], [1, 0, 0]) is None
 
 
 def test_a_surface_is_let_go_with_its_search_structure() -> None:

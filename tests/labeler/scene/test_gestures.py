@@ -88,9 +88,7 @@ def test_drags_follow_the_hand(camera: SceneCamera) -> None:
     size = camera.viewpoint().pixel_sizes(camera.focus[None])[0]
     assert control.move(50, 60)
     assert camera.viewpoint().pixel_sizes(camera.focus[None])[0] < size
-    assert control.dragging
     control.release(50, 60)
-    assert not control.dragging
     assert control.wheel(-2)
 
     camera.view_from("A")

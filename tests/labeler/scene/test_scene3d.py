@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_cases import DIRECTIONS, MIDDLE, scan_of
+from scene_cases import BALL, DIRECTIONS, MIDDLE, RADIUS, scan_of, unlike_background
 
 from gp_labeler.imaging.readers import read_volume
 from gp_labeler.imaging.surface import Surface, extract_isosurface
@@ -31,8 +31,6 @@ from gp_labeler.scene.window_level import WindowLevel
 
 pytestmark = pytest.mark.machine
 
-BALL, RADIUS = MIDDLE + np.array([1.0, 0.5, -0.7]), 3.0
-
 
 @pytest.fixture
 def scene() -> Iterator[Scene3D]:
@@ -47,27 +45,13 @@ def ball() -> Surface:
     return extract_isosurface(scan_of([(BALL, RADIUS)], np.eye(3)), 100)
 
 
-def _unlike_background(pixels: np.ndarray) -> np.ndarray:
-    """Where something is drawn: the background is a gentle gradient of one hue from top to bottom."""
-    background = pixels[:, :1].astype(int)
-    return np.abs(pixels.astype(int) - background).max(axis=2) > 25
-
-
-def _coloured(pixels: np.ndarray, colour: str) -> np.ndarray:
-    """Where a hue prevails, however it is lit."""
-    wanted = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], float)
-    shown = pixels.astype(float)
-    cosine = shown @ wanted / np.maximum(np.linalg.norm(shown, axis=2) * np.linalg.norm(wanted), 1)
-    return (cosine > 0.985) & (shown.max(axis=2) > 70)
-
-
 @pytest.mark.parametrize("letter", VIEWPOINTS)
 @pytest.mark.parametrize("name", ["straight", "mirrored", "oblique mirrored"])
 def test_a_bright_ball_is_drawn_where_it_is(scene: Scene3D, name: str, letter: str) -> None:
     scene.bone.show([extract_isosurface(scan_of([(BALL, RADIUS)], DIRECTIONS[name]), 100)])
     scene.camera.view_from(letter)
     scene.camera.focus_on(MIDDLE, across_mm=16)
-    drawn = _unlike_background(scene.image())
+    drawn = unlike_background(scene.image())
     assert drawn.shape == (240, 320)
     rows, columns = np.nonzero(drawn)
     assert np.array([columns.mean(), rows.mean()]) == pytest.approx(scene.display_of(BALL[None])[0], abs=0.6)
@@ -102,7 +86,7 @@ def test_what_is_drawn_is_what_is_hit(scene: Scene3D, ball: Surface) -> None:
     scene.target.resize(80, 60)
     scene.camera.focus_on(BALL + np.array([0.3, 0.2, 0.4]), across_mm=8)
     scene.set_colours(LIGHT)  # against a bright background, bone is seen in the shade as well
-    drawn = _unlike_background(scene.image())
+    drawn = unlike_background(scene.image())
     hit = np.array([[scene.pick(x, y) is not None for x in range(80)] for y in range(60)])
     assert hit.sum() > 1000
     assert (drawn != hit).sum() < 0.03 * hit.sum()
@@ -123,7 +107,7 @@ def test_a_click_that_misses_or_meets_what_is_not_seen_hits_nothing(scene: Scene
     scene.bone.opacity = 1
     scene.bone.visible = False
     assert scene.pick(160, 120) is None
-    assert not _unlike_background(scene.image()).any()
+    assert not unlike_background(scene.image()).any()
 
 
 def test_the_nearest_of_several_surfaces_is_hit(scene: Scene3D) -> None:
@@ -232,19 +216,19 @@ def test_themes_quick_frames_and_sizes(scene: Scene3D, ball: Surface) -> None:
     coarse = extract_isosurface(scan_of([(BALL, RADIUS / 2)], np.eye(3)), 100)
     scene.bone.show([ball], quick=[coarse])
     scene.fit()
-    fine = _unlike_background(scene.image()).sum()
+    fine = unlike_background(scene.image()).sum()
     scene.camera.zoom(1.001)
     scene.render(quick=True)
-    assert _unlike_background(scene.target.pixels()).sum() < 0.4 * fine
+    assert unlike_background(scene.target.pixels()).sum() < 0.4 * fine
     assert scene.pick(160, 120).point == pytest.approx(BALL + np.array([0, -RADIUS, 0]), abs=0.1)
     scene.camera.zoom(1 / 1.001)
-    assert _unlike_background(scene.image()).sum() == fine
+    assert unlike_background(scene.image()).sum() == fine
     scene.set_colours(LIGHT)
     assert scene.image()[0, 0].min() > 200
     scene.set_colours(DARK)
     large = scene.image(640, 480)
     assert large.shape == (480, 640, 3)
-    assert _unlike_background(large).sum() == pytest.approx(4 * fine, rel=0.03)
+    assert unlike_background(large).sum() == pytest.approx(4 * fine, rel=0.03)
     assert scene.target.size == (320, 240)
 
 
@@ -337,8 +321,8 @@ def test_two_scenes_share_nothing(ball: Surface) -> None:
     two.cube.visible = False
     one.render()
     two.render()
-    assert _unlike_background(one.target.pixels())[30:90, 40:120].any()
-    assert not _unlike_background(two.target.pixels()).any()
+    assert unlike_background(one.target.pixels())[30:90, 40:120].any()
+    assert not unlike_background(two.target.pixels()).any()
     one.close()
     assert two.image().shape == (120, 160, 3)
     two.close()
@@ -452,7 +436,7 @@ def test_the_first_bone_is_drawn_behind_the_empty_scene_and_later_turns_are_answ
     while not scene.advance(0.0):
         pass
     scene.render(quick=True)
-    assert _unlike_background(scene.target.pixels()).any()
+    assert unlike_background(scene.target.pixels()).any()
     scene.camera.rotate(40, 0)
     scene.render(quick=True)
     assert scene.n_bone_frames == n_drawn + 2

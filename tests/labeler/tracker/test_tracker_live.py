@@ -31,7 +31,7 @@ _PATIENT = Limits(late_s=5.0)
 """For a busy machine, in the tests that are not about lateness."""
 
 _CLOSE = 0.15
-"""mm. A touch is the mean of some 20 readings of 0.15 mm noise a coordinate."""
+"""mm. A touch is the mean of some 20 readings of 0.15 mm noise per coordinate."""
 
 
 @pytest.fixture(scope="module")

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import tifffile
 from document_cases import head_frame
-from panel_cases import deliver, place, workspace_with_scan
-from qtpy.QtWidgets import QWidget
+from panel_cases import deliver, place
 
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -22,29 +20,12 @@ from gp_labeler.head_pose import HeadPose
 from gp_labeler.imaging.preview import straight_preview_planes
 from gp_labeler.imaging.readers import inspect_volume
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.panels.scan.import_dialog import ImportDialog
 from gp_labeler.views.panels.scan.import_wording import facts_of
-from gp_labeler.views.theme import DARK, apply_theme
 
 TILTED = head_frame((20.0, -35.0, 50.0), (2.0, -3.0, 1.0)).T_head_scan
-
-
-@pytest.fixture
-def workspace() -> Iterator[Workspace]:
-    workspace = workspace_with_scan()
-    yield workspace
-    workspace.close(discard=True)
-
-
-@pytest.fixture
-def parent(qtbot) -> QWidget:
-    parent = QWidget()
-    apply_theme(parent, DARK)
-    qtbot.addWidget(parent)
-    return parent
 
 
 @pytest.fixture

@@ -30,12 +30,11 @@ def test_two_up_shows_the_slice_in_which_the_chosen_feature_is_best_seen(qtbot, 
     labels, frames = window.workspace.labels, window.grid.frames
     labels.choose("L", "MN")  # coronal
     window.commands.run("view.two-up")
-    qtbot.wait(10)
+    qtbot.waitUntil(lambda: abs(frames["3d"].width() - frames["coronal"].width()) < 12)
     assert visible(window) == {"3d", "coronal"}
     left = [frames[name].mapTo(window, QPoint(0, 0)) for name in ("3d", "coronal")]
     assert left[0].y() == left[1].y()
     assert left[0].x() < left[1].x()
-    assert abs(frames["3d"].width() - frames["coronal"].width()) < 12
     labels.choose("L", "CC")  # axial
     assert visible(window) == {"3d", "axial"}
     labels.choose("L", "OS")  # seen in 3D: the slice stays
@@ -45,10 +44,13 @@ def test_two_up_shows_the_slice_in_which_the_chosen_feature_is_best_seen(qtbot, 
     frames["axial"].header.maximise_asked.emit()
     assert visible(window) == {"3d", "axial"}
     window.commands.run("view.four-up")
-    qtbot.wait(10)
     assert visible(window) == set(frames)
-    top = {name: frame.mapTo(window, QPoint(0, 0)).y() for name, frame in frames.items()}
-    assert top["sagittal"] == top["coronal"] > top["3d"] == top["axial"]
+
+    def are_in_rows() -> bool:
+        top = {name: frame.mapTo(window, QPoint(0, 0)).y() for name, frame in frames.items()}
+        return top["sagittal"] == top["coronal"] > top["3d"] == top["axial"]
+
+    qtbot.waitUntil(are_in_rows)
 
 
 def test_a_typed_position_is_brought_into_every_view(window) -> None:

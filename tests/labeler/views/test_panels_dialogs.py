@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import tifffile
-from panel_cases import cut_words, deliver, in_scan, place, workspace_with_scan
+from panel_cases import cut_words, deliver, in_scan, place
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QApplication, QWidget
 
@@ -31,21 +30,6 @@ from gp_labeler.views.theme import DARK, LIGHT, apply_theme
 pytestmark = pytest.mark.any_binding
 
 CLICK = Qt.MouseButton.LeftButton
-
-
-@pytest.fixture
-def workspace() -> Iterator[Workspace]:
-    workspace = workspace_with_scan()
-    yield workspace
-    workspace.close(discard=True)
-
-
-@pytest.fixture
-def parent(qtbot) -> QWidget:
-    parent = QWidget()
-    apply_theme(parent, DARK)
-    qtbot.addWidget(parent)
-    return parent
 
 
 @pytest.fixture

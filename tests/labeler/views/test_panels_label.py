@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from panel_cases import (
@@ -13,7 +11,6 @@ from panel_cases import (
     deliver,
     in_scan,
     place,
-    workspace_with_scan,
 )
 from qtpy.compat import isalive
 from qtpy.QtCore import QCoreApplication, QEvent, QModelIndex, QPoint, QSize, Qt
@@ -43,13 +40,6 @@ LEFT, RIGHT = Side.LEFT, Side.RIGHT
 CLICK = Qt.MouseButton.LeftButton
 LOWEST_PANEL = QSize(PANEL_WIDTH, 698)
 """What a window of 1280 x 800 leaves."""
-
-
-@pytest.fixture
-def workspace() -> Iterator[Workspace]:
-    workspace = workspace_with_scan()
-    yield workspace
-    workspace.close(discard=True)
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from panel_cases import ATLAS, PANEL_WIDTH, actions_of, deliver, in_scan, place, workspace_with_scan
+from panel_cases import ATLAS, PANEL_WIDTH, actions_of, deliver, in_scan, place
 from qtpy.QtCore import QEvent, QModelIndex, QObject, QRect, QSize
 from qtpy.QtGui import QColor, QImage, QPixmap, QRegion
 from qtpy.QtWidgets import QApplication, QDialog, QWidget
@@ -32,13 +32,6 @@ from gp_labeler.views.theme import DARK, LIGHT, Theme, apply_theme, theme_of
 pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
 
 LEFT, RIGHT = Side.LEFT, Side.RIGHT
-
-
-@pytest.fixture
-def workspace() -> Iterator[Workspace]:
-    workspace = workspace_with_scan()
-    yield workspace
-    workspace.close(discard=True)
 
 
 @pytest.fixture

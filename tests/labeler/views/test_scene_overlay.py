@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from overlay_cases import frame_of, pixels_of
-from scene_cases import MIDDLE, scan_of
+from scene_cases import BALL, MIDDLE, RADIUS, coloured, scan_of, unlike_background
 
 from gp_labeler.imaging.surface import Surface, extract_isosurface
 from gp_labeler.scene.colours import DARK, LIGHT
@@ -25,7 +25,6 @@ from gp_labeler.views.painting.scene_overlay import SceneOverlay
 
 pytestmark = pytest.mark.any_binding
 
-BALL, RADIUS = MIDDLE + np.array([1.0, 0.5, -0.7]), 3.0
 SHAPES = ("ball", "diamond", "triangle", "square", "inverted")
 
 
@@ -42,22 +41,8 @@ def ball() -> Surface:
     return extract_isosurface(scan_of([(BALL, RADIUS)], np.eye(3)), 100)
 
 
-def _unlike_background(pixels: np.ndarray) -> np.ndarray:
-    """Where something is drawn: the background is a gentle gradient of one hue from top to bottom."""
-    background = pixels[:, :1].astype(int)
-    return np.abs(pixels.astype(int) - background).max(axis=2) > 25
-
-
-def _coloured(pixels: np.ndarray, colour: str) -> np.ndarray:
-    """Where a hue prevails, however it is lit."""
-    wanted = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], float)
-    shown = pixels.astype(float)
-    cosine = shown @ wanted / np.maximum(np.linalg.norm(shown, axis=2) * np.linalg.norm(wanted), 1)
-    return (cosine > 0.985) & (shown.max(axis=2) > 70)
-
-
 def _height(frame: np.ndarray) -> int:
-    return int(np.ptp(np.nonzero(_unlike_background(frame))[0])) + 1
+    return int(np.ptp(np.nonzero(unlike_background(frame))[0])) + 1
 
 
 def test_marks_are_drawn_solid_in_front_and_faint_behind_bone(scene: Scene3D, ball: Surface) -> None:
@@ -68,13 +53,13 @@ def test_marks_are_drawn_solid_in_front_and_faint_behind_bone(scene: Scene3D, ba
     scene.fit()
     assert scene.hidden(scene.marks.positions).tolist() == [False, True]
     pixels = frame_of(scene)
-    orange = _coloured(pixels, DARK.states["placed"])
+    orange = coloured(pixels, DARK.states["placed"])
     x, y = np.rint(scene.display_of(front[None])[0]).astype(int)
     assert orange[y - 2 : y + 3, x - 2 : x + 3].mean() > 0.7
     x, y = np.rint(scene.display_of(behind[None])[0]).astype(int)
     scene.marks.show([])
     bare = frame_of(scene)
-    assert not _coloured(bare, DARK.states["placed"]).any()
+    assert not coloured(bare, DARK.states["placed"]).any()
     change = np.abs(pixels[y, x].astype(int) - bare[y, x]).max()
     assert 8 < change < 120
     scene.camera.view_from("P")
@@ -90,9 +75,7 @@ def test_glyphs_are_as_large_as_asked_in_pixels_or_mm(scene: Scene3D) -> None:
         assert _height(frame_of(scene)) == pytest.approx(20, abs=2)
         scene.marks.size = GlyphSize(2.0, "mm")
         expected = 2.0 * 240 / across
-        assert np.ptp(np.nonzero(_unlike_background(frame_of(scene)))[0]) + 1 == pytest.approx(
-            expected, abs=2
-        )
+        assert np.ptp(np.nonzero(unlike_background(frame_of(scene)))[0]) + 1 == pytest.approx(expected, abs=2)
 
 
 def test_labels_do_not_cover_each_other() -> None:
@@ -145,16 +128,16 @@ def test_names_are_written_beside_their_marks(scene: Scene3D) -> None:
     overlay.scale_bar_visible = False
     scene.marks.show([Mark("a", MIDDLE, state="computed")])
     scene.camera.focus_on(MIDDLE)
-    without = _coloured(frame_of(scene, overlay), DARK.states["computed"]).sum()
+    without = coloured(frame_of(scene, overlay), DARK.states["computed"]).sum()
     scene.marks.show([Mark("a", MIDDLE, "RWA", state="computed")])
-    drawn = _coloured(frame_of(scene, overlay), DARK.states["computed"])
+    drawn = coloured(frame_of(scene, overlay), DARK.states["computed"])
     assert overlay.names == ["RWA"]
     assert drawn.sum() > without + 40
     rows, columns = np.nonzero(drawn)
     assert np.abs(columns - 160).max() < 50
     assert np.abs(rows - 120).max() < 30
     overlay.names_visible = False
-    assert _coloured(frame_of(scene, overlay), DARK.states["computed"]).sum() == without
+    assert coloured(frame_of(scene, overlay), DARK.states["computed"]).sum() == without
 
 
 @pytest.mark.parametrize("show_hidden", [True, False])
@@ -176,7 +159,7 @@ def test_a_ghost_is_outlined_by_its_95_percent_ellipse(scene: Scene3D) -> None:
     scene.ghosts.show([GhostEllipsoid("L:IN", MIDDLE, covariance, active=True)])
     scene.camera.view_from("A")
     scene.camera.focus_on(MIDDLE, across_mm=12)
-    rows, columns = np.nonzero(_coloured(frame_of(scene), DARK.states["ghost"]))
+    rows, columns = np.nonzero(coloured(frame_of(scene), DARK.states["ghost"]))
     per_mm = 240 / 12
     assert np.ptp(columns) / 2 == pytest.approx(RADIUS_95 * np.sqrt(0.8) * per_mm, abs=3)
     assert np.ptp(rows) / 2 == pytest.approx(RADIUS_95 * np.sqrt(0.1) * per_mm, abs=3)

@@ -19,7 +19,7 @@ _DOT = 2.0
 
 
 class AgreementPlot(QWidget):
-    """Three small plots beside each other, one a direction.
+    """Three small plots beside each other, one for each direction.
 
     Solid lines are the mean difference and the limits of agreement between observers, dashed ones those
     between the rounds of one observer.
@@ -34,7 +34,7 @@ class AgreementPlot(QWidget):
         )
 
     def show_panels(self, panels: Sequence[AgreementPanel]) -> None:
-        """Draw these, one a direction."""
+        """Draw these panels, one for each direction."""
         self._panels = tuple(panels)
         self.setVisible(bool(self._panels))
         self.update()

@@ -1,4 +1,4 @@
-"""The table of features as a Qt model: one row a feature, one column a side."""
+"""The table of features as a Qt model: one row for each feature, one column for each side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which side is left: asked at the top of the step Label until somebody has answered."""
+"""Which side is left: asked at the top of the step Label until it is answered."""
 
 from __future__ import annotations
 

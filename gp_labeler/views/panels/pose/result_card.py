@@ -37,7 +37,7 @@ _FRAMES = {"tracker": "tracker frame", "scan": "in the scan, LPS"}
 
 
 class ResultCard(Card):
-    """The estimate, or what is wanting for one.
+    """The estimate, or what is missing for one.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ class _OnePose(QWidget):
 
 
 class _TwoPoses(QWidget):
-    """Two poses side by side, a coordinate a row."""
+    """Two poses side by side, one coordinate in each row."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -83,12 +83,12 @@ def unit_triple(direction: Iterable[float]) -> str:
 
 
 def fine_mm(length: float | None) -> str:
-    """Return a length such as ``0.42 mm``: two digits, as probes are worth."""
+    """Return a length such as ``0.42 mm``: two digits, the precision of a probe."""
     return NONE if length is None or not math.isfinite(length) else f"{length:.2f} mm"
 
 
 def region_text(pose: CochleaPose) -> str:
-    """Return where the cochlea is with 95 %; of JRMPC, which does not know that, how the animals scatter."""
+    """Return the 95 % region in words; for JRMPC, which has none, the scatter of the animals."""
     within = "95 % within" if pose.method == "robust" else "Animals scatter by"
     return f"{within} {fine_mm(pose.radius_95)}  ·  cone {degrees_text(pose.cone_95)}"
 

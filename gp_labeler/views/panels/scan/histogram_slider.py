@@ -58,7 +58,7 @@ class HistogramSlider(QWidget):
         self.update()
 
     def set_value(self, value: float | None) -> None:
-        """Show a threshold, without telling of it; a drag under way goes on."""
+        """Show a threshold without a signal; a drag in progress continues."""
         if not self._dragging:
             self._value = value
             self.setAccessibleDescription(value_text(value))

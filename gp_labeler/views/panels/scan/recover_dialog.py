@@ -1,4 +1,4 @@
-"""What programs that were killed left unsaved: take it up, leave it, or delete it."""
+"""Unsaved edits of programs that were killed: recover, keep or delete them."""
 
 from __future__ import annotations
 

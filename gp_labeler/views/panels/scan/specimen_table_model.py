@@ -1,4 +1,4 @@
-"""The list of specimens as a Qt model: one row a specimen, with its thumbnail and progress."""
+"""The list of specimens as a Qt model: one row for each specimen, with its thumbnail and progress."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ _N_RECENT, _AROUND = 7, 24
 
 
 class Welcome(QWidget):
-    """SliceViewport where no scan is open.
+    """Shown where no scan is open.
 
     Parameters
     ----------

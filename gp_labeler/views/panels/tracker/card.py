@@ -1,4 +1,4 @@
-"""The tracked probe in the Pose panel: how it stands, and the button that records a touch."""
+"""The tracked probe in the Pose panel: the state of its link, and the button that records a touch."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["TrackerCard", "tracker_role", "tracker_words"]
 
 
 def tracker_role(workspace: Workspace) -> str:
-    """Return the look of the tracker's words: whether all is well, to be looked at, or wrong."""
+    """Return the style of the tracker's text: good, warning or error."""
     tracker = workspace.tracker
     if tracker.phase is LinkPhase.CONNECTED:
         return "good" if tracker.visible else "warning"
@@ -23,14 +23,14 @@ def tracker_role(workspace: Workspace) -> str:
 
 
 def tracker_words(workspace: Workspace) -> str:
-    """Say how the tracker stands, and what is wrong with its newest reading."""
+    """Return the state of the tracker, and what is wrong with its newest reading."""
     tracker = workspace.tracker
     trouble = tracker.trouble if tracker.phase is LinkPhase.CONNECTED and not tracker.visible else ""
     return f"{trouble[:1].upper()}{trouble[1:]}." if trouble else tracker.words
 
 
 class TrackerCard(Card):
-    """SliceViewport while a tracker is asked for.
+    """Shown while a tracker is connected or being sought.
 
     Parameters
     ----------
