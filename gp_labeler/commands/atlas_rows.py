@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
+from gp_labeler.commands.conditions import always
 from gp_labeler.models.workspace import Workspace
 
 __all__ = ["atlas_rows"]
-
-
-def _always(workspace: Workspace) -> bool:
-    return True
 
 
 def _is_loaded(workspace: Workspace) -> bool:
@@ -29,7 +26,7 @@ def _can_try(workspace: Workspace) -> bool:
 # fmt: off
 def atlas_rows() -> Iterator[Action]:
     """Return the commands of the menu Atlas."""
-    def row(id: str, title: str, run: Run | None, enabled: Test = _always, *, hint: str = "",
+    def row(id: str, title: str, run: Run | None, enabled: Test = always, *, hint: str = "",
             group: str = "which", icon: str = "") -> Action:
         return Action(f"atlas.{id}", "Atlas", title, (), run, enabled, hint=hint, group=group, icon=icon)
 

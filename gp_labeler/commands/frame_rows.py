@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
+from gp_labeler.commands.conditions import has_scan
 from gp_labeler.models.anatomical_planes import FEATURE_PLANES
 from gp_labeler.models.workspace import Workspace
 
@@ -18,28 +19,24 @@ _PLANES = (
 )
 
 
-def _has_scan(workspace: Workspace) -> bool:
-    return workspace.scan.volume is not None
-
-
 def _has_head(workspace: Workspace) -> bool:
-    return _has_scan(workspace) and workspace.head.frame is not None
+    return has_scan(workspace) and workspace.head.frame is not None
 
 
 def _has_points(workspace: Workspace) -> bool:
-    return _has_scan(workspace) and bool(workspace.head.points)
+    return has_scan(workspace) and bool(workspace.head.points)
 
 
 def _can_straighten(workspace: Workspace) -> bool:
-    return _has_scan(workspace) and not workspace.head.is_running
+    return has_scan(workspace) and not workspace.head.is_running
 
 
 def _can_take_planes(workspace: Workspace) -> bool:
-    return _has_scan(workspace) and not workspace.view.shows_anatomy
+    return has_scan(workspace) and not workspace.view.shows_anatomy
 
 
 def _is_turned(workspace: Workspace) -> bool:
-    return _has_scan(workspace) and workspace.view.planes_are_turned
+    return has_scan(workspace) and workspace.view.planes_are_turned
 
 
 def _mark(name: str) -> Run:
@@ -51,13 +48,13 @@ def _show(kind: str) -> Run:
 
 
 def _can_show(kind: str) -> Test:
-    return lambda workspace: _has_scan(workspace) and workspace.planes.can_show(kind)
+    return lambda workspace: has_scan(workspace) and workspace.planes.can_show(kind)
 
 
 def _can_show_for_feature(workspace: Workspace) -> bool:
     code = workspace.labels.active.code
     kind = FEATURE_PLANES.get(code or "")
-    return _has_scan(workspace) and code is not None and (kind is None or workspace.planes.can_show(kind))
+    return has_scan(workspace) and code is not None and (kind is None or workspace.planes.can_show(kind))
 
 
 def _show_for_feature(workspace: Workspace) -> None:
@@ -78,7 +75,7 @@ def _turn_by_hand(workspace: Workspace) -> None:
 # fmt: off
 def frame_rows() -> Iterator[Action]:
     """Return the commands of the menu View that turn the planes of the slices."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _has_scan, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = has_scan, *,
             checked: Test | None = None, hint: str = "", group: str = "head") -> Action:
         return Action(id, "View", title, keys, run, enabled, checked, hint, group)
 

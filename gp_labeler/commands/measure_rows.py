@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
+from gp_labeler.commands.conditions import has_scan, has_tool
 from gp_labeler.models.workspace import Workspace
 
 __all__ = ["measure_rows"]
-
-
-def _has_scan(workspace: Workspace) -> bool:
-    return workspace.scan.volume is not None
 
 
 def _has_measurements(workspace: Workspace) -> bool:
@@ -28,14 +25,10 @@ def _toggle(tool: str) -> Run:
     return change
 
 
-def _has_tool(tool: str) -> Test:
-    return lambda workspace: workspace.interaction.tool == tool
-
-
 # fmt: off
 def measure_rows() -> Iterator[Action]:
     """Return the commands of the menu Measure."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _has_scan, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = has_scan, *,
             checked: Test | None = None, hint: str = "", group: str = "", icon: str = "") -> Action:
         return Action(id, "Measure", title, keys, run, enabled, checked, hint, group, icon)
 
@@ -43,7 +36,7 @@ def measure_rows() -> Iterator[Action]:
         ("Ruler", "ruler", "U", "Measure a distance: click its two ends on bone, a slice or a landmark"),
         ("Angle", "angle", "Shift+U", "Measure an angle: click one arm, the vertex, the other arm"),
     ):
-        yield row(f"tool.{tool}", title, (key,), _toggle(tool), checked=_has_tool(tool), hint=hint,
+        yield row(f"tool.{tool}", title, (key,), _toggle(tool), checked=has_tool(tool), hint=hint,
                   group="measure", icon=tool)
     yield row("measure.show", "Measurements and distances…", ("Ctrl+M",),
               IN_WINDOW, group="list",

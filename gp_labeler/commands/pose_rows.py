@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
+from gp_labeler.commands.conditions import always
 from gp_labeler.document import touching
 from gp_labeler.models.workspace import Workspace
 
@@ -15,10 +16,6 @@ _METHODS = (
     ("jrmpc", "Method: JRMPC", ("jrmpc",)),
     ("both", "Method: both, side by side", ("robust", "jrmpc")),
 )
-
-
-def _always(workspace: Workspace) -> bool:
-    return True
 
 
 def _is_touched(workspace: Workspace) -> bool:
@@ -70,7 +67,7 @@ def _toggle_overlay(workspace: Workspace) -> None:
 # fmt: off
 def pose_rows() -> Iterator[Action]:
     """Return the commands of the menu Estimate."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _always, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = always, *,
             checked: Test | None = None, group: str = "", hint: str = "", icon: str = "") -> Action:
         return Action(f"pose.{id}", "Estimate", title, keys, run, enabled, checked, hint, group, icon)
 

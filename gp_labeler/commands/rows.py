@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from gp_core.landmarks.features import FEATURES
 from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
+from gp_labeler.commands.conditions import always, has_scan, has_tool
 from gp_labeler.document.edits import CheckPoint, SwapSides
 from gp_labeler.document.state import How, Landmark
 from gp_labeler.document.touches import TouchHow
@@ -20,16 +21,8 @@ GLYPH_MM = 0.6
 # When something can be done
 
 
-def _always(workspace: Workspace) -> bool:
-    return True
-
-
 def _lacks_scan(workspace: Workspace) -> bool:
     return workspace.scan.volume is None and workspace.document.state.volume is not None
-
-
-def _has_scan(workspace: Workspace) -> bool:
-    return workspace.scan.volume is not None
 
 
 def _in_use(workspace: Workspace) -> bool:
@@ -94,7 +87,7 @@ def _can_confirm(workspace: Workspace) -> bool:
 
 def _can_place(workspace: Workspace) -> bool:
     """Whether placing the chosen point moves none that has a place already, or is asked for."""
-    if not _has_scan(workspace):
+    if not has_scan(workspace):
         return False
     if not workspace.interaction.replacing:
         if workspace.measure.kind is not None:
@@ -128,10 +121,6 @@ def _has_layout(layout: str) -> Test:
 
 def _set_tool(tool: str) -> Run:
     return lambda workspace: workspace.interaction.set_tool(tool)
-
-
-def _has_tool(tool: str) -> Test:
-    return lambda workspace: workspace.interaction.tool == tool
 
 
 def _change_opacity(step: float) -> Run:
@@ -216,7 +205,7 @@ def _other_side(workspace: Workspace) -> None:
 # fmt: off
 def file_rows() -> Iterator[Action]:
     """Return the commands of the menu File."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _always, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = always, *,
             hint: str = "", group: str = "", icon: str = "") -> Action:
         return Action(f"file.{id}", "File", title, keys, run, enabled, hint=hint, group=group, icon=icon)
 
@@ -236,19 +225,19 @@ def file_rows() -> Iterator[Action]:
     yield row("save", "Save", ("Ctrl+S",), IN_WINDOW, _in_use, group="save", icon="save")
     yield row("save_as", "Save as…", ("Ctrl+Shift+S",), IN_WINDOW, _in_use,
               group="save")
-    yield row("import", "Import landmarks…", ("Ctrl+I",), IN_WINDOW, _has_scan,
+    yield row("import", "Import landmarks…", ("Ctrl+I",), IN_WINDOW, has_scan,
               group="exchange", icon="import")
     yield row("export", "Export landmarks…", ("Ctrl+E",), IN_WINDOW, _has_labels,
               hint="For 3D Slicer and gp-core", group="exchange", icon="export")
     yield row("save_mesh", "Save bone surface…", (), IN_WINDOW,
               lambda w: bool(w.bone.surfaces), group="exchange")
     yield row("screenshot", "Save picture…", (), IN_WINDOW, group="exchange")
-    yield row("show_references", "Show reference points…", (), IN_WINDOW, _has_scan,
+    yield row("show_references", "Show reference points…", (), IN_WINDOW, has_scan,
               hint="Points of any landmark list, shown in grey for comparison; not part of the specimen",
               group="references")
     yield row("clear_references", "Clear reference points", (), lambda w: w.references.clear(),
               lambda w: bool(w.references.points), group="references")
-    yield row("add_mesh", "Add mesh…", (), IN_WINDOW, _has_scan,
+    yield row("add_mesh", "Add mesh…", (), IN_WINDOW, has_scan,
               hint="Show a surface from another program with the bone; not part of the specimen",
               group="references")
     yield row("remove_meshes", "Remove added meshes", (), lambda w: w.meshes.clear(),
@@ -275,7 +264,7 @@ def edit_rows() -> Iterator[Action]:
 
 def view_rows() -> Iterator[Action]:
     """Return the commands of the menu View."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _always, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = always, *,
             checked: Test | None = None, group: str = "", hint: str = "", icon: str = "") -> Action:
         return Action(id, "View", title, keys, run, enabled, checked, hint, group, icon)
 
@@ -283,26 +272,26 @@ def view_rows() -> Iterator[Action]:
         yield row(f"view.{layout}", title, (key,), _set_layout(layout), checked=_has_layout(layout),
                   group="layout")
     yield row("view.fit_here", "Show everything in the view under the pointer", ("Ctrl+R",),
-              IN_WINDOW, _has_scan, group="layout",
+              IN_WINDOW, has_scan, group="layout",
               hint="Does not change the other views")
-    yield row("view.next_view", "Keyboard to the next view", ("F3",), IN_WINDOW, _has_scan, group="layout",
+    yield row("view.next_view", "Keyboard to the next view", ("F3",), IN_WINDOW, has_scan, group="layout",
               hint="The view with the border has the keyboard: arrow keys, Space and Enter work there")
     for title, step, key in _STEPS:
-        yield row(f"view.step_{step}", title, (key,), IN_WINDOW, _has_scan if step == "label" else _always,
+        yield row(f"view.step_{step}", title, (key,), IN_WINDOW, has_scan if step == "label" else always,
                   group="step", hint="Shows the panel of this step and moves the keyboard to it")
-    yield row("view.reset", "Show everything", ("R",), lambda w: w.view.reset_asked.emit(), _has_scan,
+    yield row("view.reset", "Show everything", ("R",), lambda w: w.view.reset_asked.emit(), has_scan,
               group="show")
-    yield row("view.go_to", "Go to position…", ("Ctrl+G",), IN_WINDOW, _has_scan,
+    yield row("view.go_to", "Go to position…", ("Ctrl+G",), IN_WINDOW, has_scan,
               group="show", hint="For example L 4.6 P 9.1 S 12.4")
     yield row("view.zoom_to_point", "Zoom to the point", ("E", "Shift+R"),
-              IN_WINDOW, _has_scan, group="show")
+              IN_WINDOW, has_scan, group="show")
     for word, keys in _VIEWPOINTS:
         yield row(f"view.from_{word}", f"Look from {word}", keys, IN_WINDOW, group="from")
     for title, tool, key in _TOOLS:
         run = IN_WINDOW if tool == "place" else _set_tool(tool)
-        yield row(f"tool.{tool}", title, (key,), run, checked=_has_tool(tool), group="tool",
+        yield row(f"tool.{tool}", title, (key,), run, checked=has_tool(tool), group="tool",
                   hint="Sets what the left mouse button does on a slice")
-    yield row("view.auto_window_level", "Automatic contrast", ("Shift+W",), _auto_window_level, _has_scan,
+    yield row("view.auto_window_level", "Automatic contrast", ("Shift+W",), _auto_window_level, has_scan,
               group="tool")
     for title, field, key in _SHOWN:
         yield row(f"view.{field}", title, (key,), _toggle(field), checked=_is_on(field), group="what")
@@ -351,7 +340,7 @@ _SHOWN = (
 
 def landmark_rows() -> Iterator[Action]:
     """Return the commands of the menu Landmarks."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _always, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = always, *,
             checked: Test | None = None, group: str = "place", hint: str = "", icon: str = "") -> Action:
         return Action(id, "Landmarks", title, keys, run, enabled, checked, hint, group, icon)
 
@@ -371,7 +360,7 @@ def landmark_rows() -> Iterator[Action]:
               icon="label", hint="As a click at the crosshair: a landmark, the end of a ruler, or a touch")
     yield row("point.replace", "Re-place with the next click", ("Shift+P",),
               lambda w: w.interaction.arm_replacing(not w.interaction.replacing),
-              lambda w: _has_scan(w) and _is_free(w) and _is_shown(w),
+              lambda w: has_scan(w) and _is_free(w) and _is_shown(w),
               checked=lambda w: w.interaction.replacing,
               hint="The next click moves the selected point; otherwise, clicks never move a placed point")
     yield row("point.skip", "Skip for now", ("N",), lambda w: w.labels.skip(), _has_active,

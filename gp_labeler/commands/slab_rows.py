@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gp_labeler.commands.action import Action, Run, Test
+from gp_labeler.commands.conditions import has_scan
 from gp_labeler.imaging.slab import DENOISERS, SLAB_MODES, THICKEST_MM, THINNEST_MM, Slab
 from gp_labeler.models.workspace import Workspace
 
@@ -14,10 +15,6 @@ _FIRST_MM, _FACTOR = 0.5, 2.0**0.5
 _WORDS = {"mean": "Mean", "maximum": "Maximum", "minimum": "Minimum"}
 _DENOISE = {"median": "Median", "gaussian": "Gaussian", "bilateral": "Bilateral (keeps edges)"}
 _KEYS = {"mean": "Shift+T", "median": "Shift+G"}
-
-
-def _has_scan(workspace: Workspace) -> bool:
-    return workspace.scan.volume is not None
 
 
 def _has_slab(workspace: Workspace) -> bool:
@@ -65,7 +62,7 @@ def _toggle_denoise(kind: str) -> Run:
 # fmt: off
 def slab_rows() -> Iterator[Action]:
     """Return the commands that change what of the scan a slice view shows."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _has_scan, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = has_scan, *,
             checked: Test | None = None, hint: str = "") -> Action:
         return Action(f"view.{id}", "View", title, keys, run, enabled, checked, hint, "slab")
 

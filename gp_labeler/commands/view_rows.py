@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
+from gp_labeler.commands.conditions import has_scan
 from gp_labeler.models.workspace import Workspace
 
 __all__ = ["cut_rows"]
@@ -14,10 +15,6 @@ _STEP_MM = 0.5
 
 def _has_bone(workspace: Workspace) -> bool:
     return bool(workspace.bone.surfaces)
-
-
-def _has_scan(workspace: Workspace) -> bool:
-    return workspace.scan.volume is not None
 
 
 def _has_place(workspace: Workspace) -> bool:
@@ -89,5 +86,5 @@ def cut_rows() -> Iterator[Action]:
     yield row("cut_deeper", "Cut: deeper", ("Shift+]",), _move(_STEP_MM), hint="By half a millimetre")
     yield row("cut_shallower", "Cut: less deep", ("Shift+[",), _move(-_STEP_MM),
               hint="By half a millimetre")
-    yield row("slices_visible", "Slices in the 3D view", ("Shift+D",), _toggle_slices, _has_scan,
+    yield row("slices_visible", "Slices in the 3D view", ("Shift+D",), _toggle_slices, has_scan,
               checked=lambda workspace: workspace.view.state.slices_visible)

@@ -179,14 +179,23 @@ class Jobs:
         """
         if self._closed:
             raise RuntimeError("these jobs are closed")
-        for task in self._tasks:
-            if key and task.key == key:
-                task.cancel()
+        if key:
+            self.cancel(key)
         new = Task(job, key, self._report)
         self._tasks.append(new)
         self.started.emit(new)
         self._pool.submit(self._run, new, done, after)
         return new
+
+    def is_running(self, *keys: str) -> bool:
+        """Whether a task with one of these keys is not finished, and not cancelled either."""
+        return any(task.key in keys and not task.progress.cancelled() for task in self._tasks)
+
+    def cancel(self, *keys: str) -> None:
+        """Ask the tasks with these keys to stop."""
+        for task in self._tasks:
+            if task.key in keys:
+                task.cancel()
 
     def cancel_all(self) -> None:
         """Ask every task to stop."""

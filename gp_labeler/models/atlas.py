@@ -180,7 +180,7 @@ class AtlasModel:
     @property
     def is_trying(self) -> bool:
         """Whether leave-one-out is at work."""
-        return any(task.key == _TRIAL for task in self._jobs.running)
+        return self._jobs.is_running(_TRIAL)
 
     @property
     def is_held_out(self) -> bool:
@@ -318,7 +318,7 @@ class AtlasModel:
     # Inside
 
     def _take(self, atlas: Atlas, animals: Animals, source: AtlasSource | None) -> None:
-        self._cancel(_TRIAL)
+        self._jobs.cancel(_TRIAL)
         self._atlas, self._specimens = atlas, animals.specimens
         self.animals = animals if animals.specimens else None
         self.source, self.trial = source, None
@@ -380,7 +380,7 @@ class AtlasModel:
 
     def _expect_by(self, atlas: Atlas | None) -> None:
         """Expect and check by an atlas, and as soon as it is fitted by one that lacks the open specimen."""
-        self._cancel("atlas without")
+        self._jobs.cancel("atlas without")
         name, before = self._document.state.specimen, self._expected_by
         others = tuple(animal for animal in self._specimens if animal.name != name)
         enough = sum(len(animal.sides) for animal in others) >= FEWEST_ANIMALS
@@ -403,11 +403,6 @@ class AtlasModel:
     def _hold_out(self, atlas: Atlas) -> None:
         self.is_refitting, self._expected_by = False, atlas
         self.expectations_changed.emit()
-
-    def _cancel(self, key: str) -> None:
-        for task in self._jobs.running:
-            if task.key == key:
-                task.cancel()
 
 
 def is_atlas_file(path: str | PathLike[str]) -> bool:

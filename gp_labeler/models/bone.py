@@ -21,7 +21,10 @@ from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.messages import Messages
 from gp_labeler.models.scan import ScanModel
 
-__all__ = ["BoneModel"]
+__all__ = ["MESHING", "BoneModel"]
+
+MESHING = ("mesh first", "mesh", "mesh ears", "mesh threshold")
+"""Keys of the jobs that lead to a mesh; the last one proposes its threshold."""
 
 EAR_HALF_MM = 7.0
 """All features of an ear but those of jaw, zygoma and incisors lie within this of its middle."""
@@ -142,9 +145,7 @@ class BoneModel:
 
     def release(self) -> None:
         """Release all meshes, and stop the work on them."""
-        for task in self._jobs.running:
-            if task.key.startswith("mesh"):
-                task.cancel()
+        self._jobs.cancel(*MESHING)
         self._forget()
 
     # Inside

@@ -82,7 +82,7 @@ class FirstLabelsModel:
     @property
     def is_running(self) -> bool:
         """Whether suggestions are being made."""
-        return any(task.key == _KEY and not task.progress.cancelled() for task in self._jobs.running)
+        return self._jobs.is_running(_KEY)
 
     @property
     def knows_left(self) -> bool:
@@ -131,9 +131,7 @@ class FirstLabelsModel:
 
     def cancel(self) -> None:
         """Stop; nothing is suggested."""
-        for task in self._jobs.running:
-            if task.key == _KEY:
-                task.cancel()
+        self._jobs.cancel(_KEY)
         self.changed.emit()
 
     def _take(self, left_confirmed: bool, found: FirstLabels) -> None:

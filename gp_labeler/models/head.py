@@ -99,7 +99,7 @@ class HeadModel:
     @property
     def is_running(self) -> bool:
         """Whether it is being straightened."""
-        return any(task.key == _KEY and not task.progress.cancelled() for task in self._jobs.running)
+        return self._jobs.is_running(_KEY)
 
     @property
     def asks_left(self) -> bool:
@@ -218,9 +218,7 @@ class HeadModel:
 
     def cancel(self) -> None:
         """Stop straightening."""
-        for task in self._jobs.running:
-            if task.key == _KEY:
-                task.cancel()
+        self._jobs.cancel(_KEY)
         self.changed.emit()
 
     def take_planes(self, *, merge: bool = False) -> None:

@@ -81,7 +81,7 @@ class ReliabilityModel:
     @property
     def is_measuring(self) -> bool:
         """Whether labels are being compared."""
-        return any(task.key == _KEY for task in self._jobs.running)
+        return self._jobs.is_running(_KEY)
 
     def measure(self, paths: Iterable[str | PathLike[str]]) -> None:
         """Compare the labels of files and folders in the background."""

@@ -207,9 +207,7 @@ class ScanModel:
 
     def _on_reset(self) -> None:
         self.truth = self._proposed = self._unchecked = None
-        for task in self._jobs.running:
-            if task.key in (_PROPOSING, _CHECKING, _READING_SLICE):
-                task.cancel()
+        self._jobs.cancel(_PROPOSING, _CHECKING, _READING_SLICE)
 
     def _on_loaded(self, _: tuple[str, ...]) -> None:
         self._read_own()
@@ -259,8 +257,7 @@ class ScanModel:
 
     def read_slice(self, x: int) -> None:
         """Read in the background what slices of one x need, unless that is being done; `slice_read` tells."""
-        reading = (task for task in self._jobs.running if task.key == _READING_SLICE)
-        if self.volume is not None and all(task.progress.cancelled() for task in reading):
+        if self.volume is not None and not self._jobs.is_running(_READING_SLICE):
             self._jobs.submit(ReadSlice(self.volume, x), lambda _: self.slice_read.emit(), key=_READING_SLICE)
 
     def _on_job(self, _: object) -> None:

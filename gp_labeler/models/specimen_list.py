@@ -92,7 +92,7 @@ class SpecimenListModel:
     @property
     def is_listing(self) -> bool:
         """Whether files are being read."""
-        return any(task.key == _LISTING for task in self._jobs.running)
+        return self._jobs.is_running(_LISTING)
 
     @property
     def text(self) -> str:
@@ -127,9 +127,6 @@ class SpecimenListModel:
 
     def refresh(self) -> None:
         """Read all files again in the background."""
-        for task in self._jobs.running:
-            if task.key == _LISTING:
-                task.cancel()
         there = tuple(folder for folder in self.folders if folder.exists())
         self._jobs.submit(ListSpecimens(there, self._every), self._take, key=_LISTING)
 

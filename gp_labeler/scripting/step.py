@@ -101,7 +101,7 @@ def make_step(kinds: Mapping[str, type[Step]], table: Any) -> Step:
 
 
 def _filled(kind: type[S], given: Mapping[str, Any]) -> S:
-    hints, known = _hints(kind), {field.name: field for field in fields(kind)}
+    hints, known = get_type_hints(kind), {field.name: field for field in fields(kind)}
     for key in given:
         if key not in known:
             allowed = f"It takes {', '.join(known)}." if known else "It takes nothing."
@@ -110,10 +110,6 @@ def _filled(kind: type[S], given: Mapping[str, Any]) -> S:
         if name not in given and field.default is MISSING and field.default_factory is MISSING:
             raise GpError(f"{kind.do}: {name} is missing")
     return kind(**{key: _converted(f"{kind.do}: {key}", hints[key], value) for key, value in given.items()})
-
-
-def _hints(kind: type[Step]) -> dict[str, Any]:
-    return get_type_hints(kind)
 
 
 def _nearest(word: object, allowed: Iterable[str]) -> str:

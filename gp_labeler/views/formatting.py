@@ -15,6 +15,7 @@ __all__ = [
     "mm_text",
     "number_text",
     "position_text",
+    "sentence",
     "size_text",
     "spacing_text",
     "suggestion_text",
@@ -31,6 +32,11 @@ def capitalised(text: str) -> str:
     """Return a sentence with a capital letter, unless a file or a name begins it."""
     first = text.partition(" ")[0]
     return text[:1].upper() + text[1:] if first.isalpha() and first.islower() else text
+
+
+def sentence(text: str) -> str:
+    """Return a clause with a capital letter and a full stop."""
+    return text[:1].upper() + text[1:].rstrip(".") + "."
 
 
 def number_text(value: float, digits: int, *, signed: bool = False) -> str:

@@ -21,11 +21,10 @@ from gp_labeler.models.pose import ORDER
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels, styled, text_scale
-from gp_labeler.views.formatting import degrees_text
+from gp_labeler.views.formatting import degrees_text, sentence
 from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import scrolled, text_label
-from gp_labeler.views.panels.pose.wording import sentence
 from gp_labeler.views.panels.tracker.card import tracker_role, tracker_words
 from gp_labeler.views.signals import attempt, follow
 from gp_labeler.views.stylesheet import set_role

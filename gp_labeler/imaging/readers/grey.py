@@ -9,7 +9,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from gp_core.errors import GpError
 
-__all__ = ["loaded_dtype", "narrowing", "needs_float64", "palette_as_grey", "to_grey"]
+__all__ = ["check_channel", "loaded_dtype", "narrowing", "needs_float64", "palette_as_grey", "to_grey"]
 
 _KEPT = ("uint8", "int16", "uint16", "int32", "uint32", "float32")
 _WIDENED = {"bool": "uint8", "int8": "int16"}
@@ -53,6 +53,12 @@ def needs_float64(stored: DTypeLike, loaded: NDArray[Any]) -> bool:
     return step > _FINE_ENOUGH * (float(high) - float(low))
 
 
+def check_channel(channel: int | None, n_channels: int) -> None:
+    """Raise `GpError` unless there is such a channel; None asks for none."""
+    if channel is not None and not 0 <= channel < n_channels:
+        raise GpError(f"channel must be 0 to {n_channels - 1}, got {channel}")
+
+
 def to_grey(plane: NDArray[Any], channel: int | None = None) -> NDArray[Any]:
     """Return the (y, x) grey image of a (y, x) or (y, x, channels) one, in the same type.
 
@@ -67,8 +73,7 @@ def to_grey(plane: NDArray[Any], channel: int | None = None) -> NDArray[Any]:
     if plane.ndim == 2:
         return plane
     n_channels = plane.shape[2]
-    if channel is not None and not 0 <= channel < n_channels:
-        raise GpError(f"channel must be 0 to {n_channels - 1}, got {channel}")
+    check_channel(channel, n_channels)
     if channel is not None or n_channels < 3:
         return plane[..., channel or 0]
     wide = np.float64 if plane.dtype.kind == "f" else np.int64

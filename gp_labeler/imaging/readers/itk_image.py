@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gp_core.errors import GpError
 from gp_labeler.imaging.readers.formats import volume_stem
+from gp_labeler.imaging.readers.grey import check_channel
 from gp_labeler.imaging.readers.headers import Header
 from gp_labeler.imaging.readers.metaimage_header import read_meta_header
 from gp_labeler.imaging.readers.nifti_header import read_nifti_header
@@ -70,15 +70,10 @@ def _findings(
             else f"channel {options.channel or 0}"
         )
         problems.append(warning("colour", f"its voxels have {header.channels} channels; {taken} is taken"))
-        _check_channel(options.channel, header.channels)
+        check_channel(options.channel, header.channels)
     if np.linalg.det(header.geometry.direction) < 0:
         notes.append("the voxel axes are left-handed; positions are used as stored")
     twin = path.with_suffix("") if path.name.lower().endswith(".nii.gz") else None
     if twin is not None and twin.exists():
         notes.append(f"{twin.name} is beside it and was not changed")
     return tuple(problems), tuple(notes)
-
-
-def _check_channel(channel: int | None, channels: int) -> None:
-    if channel is not None and not 0 <= channel < channels:
-        raise GpError(f"channel must be 0 to {channels - 1}, got {channel}")

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import tifffile
 
-from gp_core.errors import GpError
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers.choosing import FEW, Choice, choose
 from gp_labeler.imaging.readers.formats import TIFF_SUFFIXES
+from gp_labeler.imaging.readers.grey import check_channel
 from gp_labeler.imaging.readers.image_files import image_header, image_pixel_size, read_image
 from gp_labeler.imaging.readers.naming import Numbering, SliceGroup, group_slices, number_slices
 from gp_labeler.imaging.readers.ome import ome_images
@@ -277,15 +277,10 @@ def _mixtures(headers: dict[Path, _Slice], options: ImportOptions) -> list[Probl
     elif coloured:
         taken = "luminance" if options.channel is None else f"channel {options.channel}"
         found.append(warning("colour", f"the slices are in colour; {taken} is taken"))
-        _check_channel(options.channel, min(h.channels for h in headers.values()))
+        check_channel(options.channel, min(h.channels for h in headers.values()))
     if usual == "palette":
         found.append(warning("palette", "the slices have a palette; its colours become grey"))
     return found
-
-
-def _check_channel(channel: int | None, channels: int) -> None:
-    if channel is not None and not 0 <= channel < channels:
-        raise GpError(f"channel must be 0 to {channels - 1}, got {channel}")
 
 
 def _geometry(

@@ -139,7 +139,7 @@ def finishing(page: tifffile.TiffPage, channel: int | None) -> Callable[[Plane],
     """Return what makes a grey slice of the values of a page: palette, colours, inversion, orientation."""
     finish: Callable[[Plane], Plane]
     if page.photometric == PALETTE and page.colormap is not None:
-        finish = partial(_finish_palette, colours=page.colormap.T, channel=channel)
+        finish = partial(palette_as_grey, colours=page.colormap.T, channel=channel)
     elif page.ndim == 2 and page.photometric != _MIN_IS_WHITE:
         finish = to_grey  # the values themselves
     else:
@@ -161,10 +161,6 @@ def _white(page: tifffile.TiffPage) -> int:
     """Return the value that becomes 0; unsigned values keep their range, others change their sign only."""
     unsigned = page.dtype is not None and page.dtype.kind in "bu"
     return (1 << int(np.max(page.bitspersample))) - 1 if unsigned else 0
-
-
-def _finish_palette(plane: Plane, colours: Plane, channel: int | None) -> Plane:
-    return palette_as_grey(plane, colours, channel)
 
 
 def _finish(plane: Plane, planar: bool, white: int | None, channel: int | None) -> Plane:

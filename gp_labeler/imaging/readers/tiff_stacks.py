@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import tifffile
 
-from gp_core.errors import GpError
 from gp_labeler.imaging.readers.choosing import FEW
+from gp_labeler.imaging.readers.grey import check_channel
 from gp_labeler.imaging.readers.ome import OmeImage, ome_images
 from gp_labeler.imaging.readers.problems import VolumeError
 from gp_labeler.imaging.readers.tiff_pages import check_orientations, is_reduced
@@ -168,8 +168,7 @@ def _slices_of(axes: str, shape: tuple[int, ...], channel: int | None) -> tuple[
     index = [0] * len(shape)
     for axis in others:
         if axes[axis] == "C" and channel is not None:
-            if not 0 <= channel < shape[axis]:
-                raise GpError(f"channel must be 0 to {shape[axis] - 1}, got {channel}")
+            check_channel(channel, shape[axis])
             index[axis] = channel
     step = math.prod(shape[stack + 1 :])
     first = int(np.ravel_multi_index(index, shape))

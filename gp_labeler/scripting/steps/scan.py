@@ -123,9 +123,7 @@ def _take_labels(driver: WindowDriver, file: Path) -> None:
     volume = workspace.scan.volume
     assert volume is not None
     workspace.open_specimen(file)
-    for task in workspace.jobs.running:
-        if task.key == "open":
-            task.cancel()  # the scan need not be read once more
+    workspace.jobs.cancel("open")  # the scan need not be read once more
     del driver.messages[since:]
     reference = workspace.document.state.volume
     if reference is not None and (differences := reference.differences(VolumeReference.of(volume))):

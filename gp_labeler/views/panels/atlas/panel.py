@@ -24,6 +24,7 @@ from gp_labeler.jobs.atlas import FEWEST_ANIMALS, FitAtlas
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.formatting import sentence
 from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.atlas.feature_table import FeatureTable
@@ -31,7 +32,6 @@ from gp_labeler.views.panels.atlas.repeatability_card import RepeatabilityCard
 from gp_labeler.views.panels.card_parts import Notices
 from gp_labeler.views.panels.finding_list import FindingList, FindingRow
 from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, emptied, scrolled, text_label
-from gp_labeler.views.panels.scan.import_wording import sentence
 from gp_labeler.views.signals import blocked, follow
 
 __all__ = ["AtlasPanel"]

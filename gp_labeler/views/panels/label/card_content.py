@@ -10,7 +10,7 @@ from gp_labeler.document.state import Landmark
 from gp_labeler.models.anatomical_planes import FEATURE_PLANES
 from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.workflow import OPENING, PointState
-from gp_labeler.views.formatting import mm_text, suggestion_text
+from gp_labeler.views.formatting import mm_text, sentence, suggestion_text
 from gp_labeler.views.panels.parts import breakable
 from gp_labeler.views.times import time_text
 
@@ -177,8 +177,7 @@ def _status(labels: LabelsModel, side: Side, code: str, state: PointState) -> tu
         return f"Not confirmed{source}. It counts once you confirm or correct it.", "ghost"
     problem = labels.known_problems(side).get(code)
     if state is PointState.DOUBTFUL and problem is not None:
-        words = problem.text
-        return f"{words[:1].upper()}{words[1:]}.", "danger"
+        return sentence(problem.text), "danger"
     if state is PointState.CHECKED:
         return "Placed, and checked by a person.", "good"
     if state is PointState.PLACED:

@@ -24,6 +24,7 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.document.lab_names import LabNamesMemory
 from gp_labeler.document.landmark_import import OffBoneError, Predicate, import_landmarks
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.formatting import sentence
 from gp_labeler.views.layouts import STRETCH, in_column, in_row, placed, wide
 from gp_labeler.views.panels.label.lab_names_table import LabNamesTable
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
@@ -220,7 +221,7 @@ class LandmarkImportDialog(QDialog):
             )
         except OffBoneError as error:
             self._objection = error.problem
-            self._show([("warning", _sentence(error.problem) + " " + (error.remedy or ""))])
+            self._show([("warning", sentence(error.problem) + " " + (error.remedy or ""))])
         except GpError as error:
             self._show([("error", str(error))])
         else:
@@ -238,7 +239,7 @@ class LandmarkImportDialog(QDialog):
         self._title.set_words("Imported, with warnings")
         self._choices.hide()
         self.show_only.hide()
-        self._show([("good", f"Now placed: {done}"), *(("warning", _sentence(note)) for note in notes)])
+        self._show([("good", f"Now placed: {done}"), *(("warning", sentence(note)) for note in notes)])
         self.take.hide()
         self.cancel.setText("Close")
 
@@ -247,7 +248,3 @@ def _words(landmarks: LandmarkSet) -> str:
     unseen = f", {len(landmarks.unseen)} not seen" if landmarks.unseen else ""
     suggested = f", {len(landmarks.suggested)} only suggested" if landmarks.suggested else ""
     return f"{len(landmarks.placed)} points of the {landmarks.side.word} side{suggested}{unseen}"
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:].rstrip(".") + "."

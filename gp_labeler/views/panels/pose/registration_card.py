@@ -13,12 +13,12 @@ from gp_labeler.document import touching
 from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import HEADING, styled
-from gp_labeler.views.formatting import NONE, position_text
+from gp_labeler.views.formatting import NONE, position_text, sentence
 from gp_labeler.views.layouts import in_row, wide
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Notices, Segments, link, numbers
 from gp_labeler.views.panels.parts import Card, text_label
-from gp_labeler.views.panels.pose.wording import fine_mm, sentence
+from gp_labeler.views.panels.pose.wording import fine_mm
 from gp_labeler.views.signals import attempt, follow
 
 __all__ = ["RegistrationCard"]

@@ -15,6 +15,7 @@ from gp_labeler.models.both_ears import BothEars
 from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import HEADING, TITLE, styled
+from gp_labeler.views.formatting import sentence
 from gp_labeler.views.panels.card_parts import Notices, QualityBadge, link, numbers
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
@@ -25,7 +26,6 @@ from gp_labeler.views.panels.pose.wording import (
     gain_text,
     likely_text,
     region_text,
-    sentence,
     triple,
     unit_triple,
 )

@@ -15,7 +15,7 @@ from gp_core.pose.next_touch import TouchGain
 from gp_labeler.document.touches import Touch, TouchHow
 from gp_labeler.models.both_ears import BothEars
 from gp_labeler.models.estimate import SideEstimate
-from gp_labeler.views.formatting import NONE, degrees_text, number_text
+from gp_labeler.views.formatting import NONE, degrees_text, number_text, sentence
 
 __all__ = [
     "allowance_text",
@@ -27,7 +27,6 @@ __all__ = [
     "name_of",
     "parse_position",
     "region_text",
-    "sentence",
     "touch_text",
     "triple",
     "unit_triple",
@@ -201,8 +200,3 @@ def _how(touch: Touch) -> str:
     text = words.get(touch.how, str(touch.how.value).capitalize())
     details = [touch.source, touch.by, touch.time.replace("T", " ").removesuffix("+00:00")]
     return ", ".join(part for part in (text, *details) if part)
-
-
-def sentence(text: str) -> str:
-    """Return a clause with a capital letter and a full stop."""
-    return text[:1].upper() + text[1:].rstrip(".") + "."

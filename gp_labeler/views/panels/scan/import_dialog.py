@@ -24,6 +24,7 @@ from gp_labeler.jobs.runner import Task
 from gp_labeler.jobs.scan import InspectScan
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit
+from gp_labeler.views.formatting import sentence
 from gp_labeler.views.layouts import in_column, in_row, wide
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
@@ -42,7 +43,6 @@ from gp_labeler.views.panels.scan.import_wording import (
     bare,
     facts_of,
     remedy,
-    sentence,
     why_not,
 )
 from gp_labeler.views.panels.scan.preview_picture import PreviewPicture
@@ -302,6 +302,4 @@ class ImportDialog(QDialog):
         super().closeEvent(event)
 
     def _stop(self) -> None:
-        for task in self._workspace.jobs.running:
-            if task.key in ("import preview", "import straight preview", "import look"):
-                task.cancel()
+        self._workspace.jobs.cancel("import preview", "import straight preview", "import look")

@@ -13,7 +13,7 @@ from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.jobs.runner import Progress
 from gp_labeler.views.formatting import TIMES, size_text, spacing_text
 
-__all__ = ["MB", "PreviewScan", "bare", "facts_of", "remedy", "sentence", "why_not"]
+__all__ = ["MB", "PreviewScan", "bare", "facts_of", "remedy", "why_not"]
 
 MB = 2**20
 _AXES = ("columns", "rows", "slices")
@@ -93,8 +93,3 @@ def why_not(errors: tuple[Problem, ...]) -> str:
     if any("accept" in problem.resolved_by for problem in errors):
         return "Review the problems, and accept them to continue."
     return "It cannot be loaded." if errors else ""
-
-
-def sentence(text: str) -> str:
-    """Return a clause as a sentence."""
-    return text[:1].upper() + text[1:].rstrip(".") + "."

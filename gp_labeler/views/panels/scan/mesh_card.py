@@ -8,6 +8,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QSlider, QWidget
 
 from gp_labeler.jobs.runner import Task
+from gp_labeler.models.bone import MESHING
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels, text_width
 from gp_labeler.views.formatting import mm_text
@@ -137,21 +138,19 @@ class MeshCard(Card):
     def _mesh_ears(self) -> None:
         labels = self._workspace.labels
         self._workspace.bone.mesh_ears()
-        if not any(task.key == "mesh ears" for task in self._workspace.jobs.running):
+        if not self._workspace.jobs.is_running("mesh ears"):
             where = labels.active.side.word
             self._workspace.say(f"Place a feature first (such as CA {where}) to locate the ear.", "warning")
 
     def _on_progress(self, task: Task[Any]) -> None:
-        if task.key.startswith("mesh"):
+        if task.key in MESHING:
             self._work.show()
             self._doing.setText(task.job.title)
             self.progress.setValue(round(100 * task.fraction))
 
     def _on_end(self, _: Task[Any]) -> None:
-        self._work.setVisible(any(task.key.startswith("mesh") for task in self._workspace.jobs.running))
+        self._work.setVisible(self._workspace.jobs.is_running(*MESHING))
         self.refresh()
 
     def _stop(self) -> None:
-        for task in self._workspace.jobs.running:
-            if task.key.startswith("mesh"):
-                task.cancel()
+        self._workspace.jobs.cancel(*MESHING)

@@ -7,7 +7,7 @@ from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.formatting import TIMES, size_text, spacing_text
+from gp_labeler.views.formatting import TIMES, sentence, size_text, spacing_text
 from gp_labeler.views.layouts import in_column
 from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
@@ -80,7 +80,7 @@ class ScanPanel(QWidget):
         emptied(self._notes)
         notes = () if volume is None else volume.notes
         for note in notes[:_N_NOTES]:
-            self._notes.addWidget(Notice("info", _sentence(note)))
+            self._notes.addWidget(Notice("info", sentence(note)))
         if len(notes) > _N_NOTES:
             more = "\n".join(notes[_N_NOTES:])
             rest = text_label(f"and {len(notes) - _N_NOTES} more notes", "hint")
@@ -119,7 +119,3 @@ def _axes(volume: Volume) -> str:
         words.append(f"{name} to {'LPS'[row] if column[row] > 0 else 'RAI'[row]}")
         oblique = oblique or abs(column[row]) < 0.999
     return ", ".join(words) + (" (oblique)" if oblique else "")
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:].rstrip(".") + "."

@@ -6,6 +6,7 @@ from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QW
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.tracker import LinkPhase
+from gp_labeler.views.formatting import sentence
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.signals import attempt, blocked, follow
@@ -26,7 +27,7 @@ def tracker_words(workspace: Workspace) -> str:
     """Return the state of the tracker, and what is wrong with its newest reading."""
     tracker = workspace.tracker
     trouble = tracker.trouble if tracker.phase is LinkPhase.CONNECTED and not tracker.visible else ""
-    return f"{trouble[:1].upper()}{trouble[1:]}." if trouble else tracker.words
+    return sentence(trouble) if trouble else tracker.words
 
 
 class TrackerCard(Card):
