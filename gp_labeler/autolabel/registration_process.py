@@ -123,10 +123,11 @@ class ProcessRegistration:
         """Return the connection to the process, once that listens: until then, sending images would wait."""
         if self._connection is None:
             context = worker_context()
-            self._connection, theirs = context.Pipe()
-            self._process = context.Process(target=_serve, args=(theirs, self.name), daemon=True)
-            self._process.start()
+            ours, theirs = context.Pipe()
+            process = context.Process(target=_serve, args=(theirs, self.name), daemon=True)
+            process.start()
             theirs.close()
+            self._process, self._connection = process, ours
             self._received(self._connection, cancel)
         return self._connection
 

@@ -144,6 +144,22 @@ def test_it_is_stopped_while_the_other_process_still_starts(monkeypatch):
     os.close(held[0])
 
 
+def test_a_process_that_cannot_be_started_is_said_in_one_line(monkeypatch):
+    def refuse():
+        raise OSError("too many processes")
+
+    class Full:
+        Pipe = staticmethod(multiprocessing.Pipe)
+
+        def Process(self, target, args, daemon):  # noqa: N802 - as a context has it
+            return SimpleNamespace(start=refuse)
+
+    monkeypatch.setattr("gp_labeler.autolabel.registration_process.worker_context", Full)
+    image = np.zeros((20, 20, 20), np.float32)
+    with ProcessRegistration("greedy") as registration, pytest.raises(GpError, match="Free some memory"):
+        registration.register(image, image, 1.0, "1")
+
+
 def test_what_cannot_be_suggested_is_said(workspace, tmp_path):
     made, calls = workspace
     failed = []
