@@ -23,7 +23,7 @@ from typing import Any
 
 from gp_core.errors import FileFormatError, GpError
 
-__all__ = ["STANDARD", "kind_of", "shown_name", "standard_streams"]
+__all__ = ["STANDARD", "kind_of", "shown_name", "shown_path", "standard_streams"]
 
 STANDARD = "-"
 
@@ -120,6 +120,23 @@ def shown_name(path: str | os.PathLike[str]) -> str:
     file = Path(path)
     is_stream = file.parent.name.startswith(_PREFIX) and file.name.startswith(_INPUT)
     return _INPUT if is_stream else file.name
+
+
+def shown_path(path: str | os.PathLike[str]) -> str:
+    """Return a path for people: ``standard output`` or ``standard input`` in place of a temporary file.
+
+    Parameters
+    ----------
+    path : path-like
+        As an option names it while its command runs.
+
+    Returns
+    -------
+    str
+        As it was given, unless it was ``-``.
+    """
+    file = Path(path)
+    return file.stem if file.parent.name.startswith(_PREFIX) else str(path)
 
 
 def _is_standard(value: object) -> bool:

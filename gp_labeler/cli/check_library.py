@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs, write_text
-from gp_core.standard_streams import standard_streams
+from gp_core.standard_streams import shown_path, standard_streams
 from gp_labeler.cli.propose import add_library_options, library_of, prepare
 
 __all__ = ["make_check_library_parser", "run_check_library"]
@@ -91,5 +91,5 @@ def _check(args: argparse.Namespace) -> int:
     for name in check.unchecked:
         sys.stdout.write(f"{name}: the head was not found, so its labels were not checked\n")
     if drawn:
-        sys.stdout.write(f"pictures: {', '.join(map(str, drawn))}\n")
+        sys.stdout.write(f"pictures: {', '.join(map(shown_path, drawn))}\n")
     return 1 if check.findings else 0

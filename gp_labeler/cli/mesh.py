@@ -11,7 +11,7 @@ from typing import Any
 from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs
 from gp_core.errors import GpError
-from gp_core.standard_streams import standard_streams
+from gp_core.standard_streams import shown_path, standard_streams
 
 __all__ = ["add_import_options", "import_options", "make_mesh_parser", "run_mesh"]
 
@@ -128,7 +128,7 @@ def _mesh(args: argparse.Namespace, options: dict[str, Any], surface_options: di
     for note in volume.notes:
         sys.stderr.write(f"gp-labeler: {volume.name}: {note}\n")
     sys.stdout.write(
-        f"{args.output}: {surface.n_triangles} triangles, threshold {threshold:g}, {volume.name} "
+        f"{shown_path(args.output)}: {surface.n_triangles} triangles, threshold {threshold:g}, {volume.name} "
         f"({' x '.join(f'{s:g}' for s in volume.spacing)} mm)\n"
     )
     return 0

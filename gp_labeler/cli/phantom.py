@@ -11,7 +11,7 @@ from typing import Any
 
 from gp_core.command_line import CommandParser
 from gp_core.errors import GpError
-from gp_core.standard_streams import standard_streams
+from gp_core.standard_streams import shown_path, standard_streams
 from gp_labeler.phantom.variation import SWITCHES, USUAL, HeadVariation
 
 __all__ = ["make_phantom_parser", "run_phantom"]
@@ -107,7 +107,9 @@ def _make(args: argparse.Namespace, seeds: Sequence[int], variations: Sequence[H
         files = save_phantom(phantom, path, labelled=args.labelled)
         size = " x ".join(map(str, phantom.volume.size))
         done = ", ".join(map(_option, variation.names)) or "plain"
-        sys.stdout.write(f"{path}: {size} voxels, {done}; {', '.join(file.name for file in files[1:])}\n")
+        is_file = shown_path(path) == str(path)  # to a stream goes the scan alone
+        beside = f"; {', '.join(file.name for file in files[1:])}" if is_file else ""
+        sys.stdout.write(f"{shown_path(path)}: {size} voxels, {done}{beside}\n")
     return 0
 
 

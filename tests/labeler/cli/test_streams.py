@@ -54,3 +54,18 @@ def test_a_list_goes_out_as_json_alone(
     assert json.loads(done.out) == []
     assert "0 specimens" in done.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_text_for_people_names_the_stream_and_no_file_of_ours(
+    tmp_path: Path, capsysbinary: pytest.CaptureFixture[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["phantom", "--spacing", "0.5", "-o", "-"]) == 0
+    scan, told = capsysbinary.readouterr()
+    assert told.decode() == "standard output: 103 x 148 x 90 voxels, plain\n"
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(scan)))
+    assert main(["mesh", "-", "-o", "-"]) == 0
+    mesh, told = capsysbinary.readouterr()
+    assert mesh.startswith(b"ply")
+    assert told.decode().startswith("standard output: ")
+    assert list(tmp_path.iterdir()) == []
