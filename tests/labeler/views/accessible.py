@@ -60,6 +60,10 @@ LARGE = 150
 _SCALE = 3
 """How much larger words are drawn to see their colour: at their own size most pixels are half covered."""
 
+_NO_ROLES = ("", "NoRole", "Client", "Window")
+_PAINTED = ("HistogramSlider", "SceneView", "SliceView", "Scrolled")
+"""Pictures, and an area that scrolls: Qt has no role for what is painted, and theirs are told by the name."""
+
 _CARET = 120
 """Pixels, more than the caret of a field has: so many at least make a focus visible."""
 
@@ -82,6 +86,13 @@ def spoken(widget: QWidget) -> str:
     QAccessible = import_module("PySide6.QtGui").QAccessible
     interface = QAccessible.queryAccessibleInterface(widget)
     return interface.text(QAccessible.Text.Name).strip() if interface else ""
+
+
+def role_of(widget: QWidget) -> str:
+    """Return what a screen reader calls it, such as ``Button``."""
+    QAccessible = import_module("PySide6.QtGui").QAccessible
+    interface = QAccessible.queryAccessibleInterface(widget)
+    return interface.role().name if interface else ""
 
 
 # What is seen
@@ -278,6 +289,8 @@ class Walk:
             name = spoken(widget)
             if sum(map(str.isalnum, name)) < 2:
                 self.found["names"].add(f"{state}: {type(widget).__name__} {name!r}")
+            if role_of(widget) in _NO_ROLES and type(widget).__name__ not in _PAINTED:
+                self.found["roles"].add(f"{state}: {type(widget).__name__}")
         focusable = [each for each in _focusable(root) if self._is_new(_focus_kind(each))]
         words = [each for each in words_of(root) if self._is_new(each.kind)]
         painted = {each.words for each in painted_words(root) if self._is_new(each.kind)}

@@ -113,8 +113,9 @@ def test_no_word_is_cut_in_any_state(found) -> None:
     assert found["cut"] == set()
 
 
-def test_every_control_has_a_name_for_a_screen_reader(found) -> None:
+def test_every_control_has_a_name_and_a_role_for_a_screen_reader(found) -> None:
     assert found["names"] == set()
+    assert found["roles"] == set()
 
 
 def test_every_control_shows_that_it_has_the_focus(found) -> None:
