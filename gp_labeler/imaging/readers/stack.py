@@ -175,7 +175,7 @@ def _plan(
     kind = (
         "SkyScan" if log else group.files[0].suffix[1:].upper().replace("TIFF", "TIF").replace("TIF", "TIFF")
     )
-    found += _numbering_problems(group, numbering)
+    found += _numbering_problems(group, numbering, given=options.spacing is not None)
     found += _odd_sizes(strays, odd, headers, shape)
     found += _mixtures(usable, options)
     found += orientation_problems({header.orientation for header in usable.values()})
@@ -199,7 +199,8 @@ def _plan(
     )
 
 
-def _numbering_problems(group: SliceGroup, numbering: Numbering) -> list[Problem]:
+def _numbering_problems(group: SliceGroup, numbering: Numbering, *, given: bool) -> list[Problem]:
+    """Find missing and doubled numbers, and say what steps mean where the voxel size is not given."""
     found = []
     if numbering.missing:
         gap = names([str(number) for number in numbering.missing], 6)
@@ -219,7 +220,8 @@ def _numbering_problems(group: SliceGroup, numbering: Numbering) -> list[Problem
         found.append(Problem("doubled", text, remedy=remedy, resolved_by=("accept",)))
     if numbering.step > 1:
         text = f"the numbers of the slices run in steps of {numbering.step}"
-        found.append(warning("step", f"{text}: the distance of slices is taken to be as many times larger"))
+        told = "" if given else ": the distance of slices is taken to be as many times larger"
+        found.append(warning("step", text + told))
     return found
 
 

@@ -465,6 +465,8 @@ def test_a_slice_distance_of_files_in_steps_is_asked(tmp_path: Path) -> None:
         )
     with pytest.raises(VolumeError, match=r"slices 0.3 mm apart, but their numbers run in steps of 2.*0.6"):
         read_volume(tmp_path)
+    assert is_right(tmp_path, **GIVEN)
+    assert "the numbers of the slices run in steps of 2" in read_volume(tmp_path, **GIVEN).notes
 
 
 # SkyScan and Scanco --------------------------------------------------------------------------------
