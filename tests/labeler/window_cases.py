@@ -32,6 +32,12 @@ def ball_volume() -> Volume:
     return Volume.from_parts(value.astype(np.float32), [VOXEL_MM] * 3, start, name="ball")
 
 
+def on_ball(*direction: float) -> np.ndarray:
+    """The point of the ball in a direction from its middle, (3,) mm."""
+    towards = np.array(direction, dtype=float)
+    return MIDDLE + BALL_MM * towards / np.linalg.norm(towards)
+
+
 def write_ball(file: Path) -> Path:
     """Write that ball as a scan."""
     import SimpleITK as sitk  # noqa: N813
@@ -150,3 +156,9 @@ def image_bytes(image: QImage) -> np.ndarray:
     bits = image.constBits()
     raw = bits.asarray(image.sizeInBytes()) if hasattr(bits, "asarray") else bits
     return np.frombuffer(raw, np.uint8).copy()
+
+
+def shown_pixels(view) -> np.ndarray:
+    """What a view shows now, (height, width, 3), blue, green, red."""
+    image = view.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    return image_bytes(image).reshape(image.height(), image.width(), 4)[..., :3].astype(int)

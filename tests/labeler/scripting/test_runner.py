@@ -5,18 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from script_cases import SPECIMEN, content, place, run
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, ball_volume
+from window_cases import MIDDLE, VOXEL_MM, ball_volume, on_ball
 
 from gp_labeler.scripting.runner import do_step, run_script
 from gp_labeler.scripting.script import StepError, make_script
 from gp_labeler.scripting.window_driver import WindowDriver
 
 pytestmark = pytest.mark.machine
-
-
-def on_ball(*direction: float) -> np.ndarray:
-    towards = np.array(direction, dtype=float)
-    return MIDDLE + BALL_MM * towards / np.linalg.norm(towards)
 
 
 INSIDE = MIDDLE + np.array([2.1, -1.7, 1.3])

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from document_cases import head_frame
-from qtpy.QtGui import QImage
 from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, image_bytes, wait_until_idle
+from window_cases import BALL_MM, MIDDLE, shown_pixels, wait_until_idle
 
 from gp_labeler.document.head_edits import SetHeadFrame
 from gp_labeler.scene.planes import Plane
@@ -27,13 +26,8 @@ def window(qtbot, one_window, ball):
     one_window.workspace.head.forget_points()
 
 
-def _pixels(view) -> np.ndarray:
-    image = view.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
-    return image_bytes(image).reshape(image.height(), image.width(), 4)[..., :3].astype(int)
-
-
 def _changed(view, before) -> np.ndarray:
-    return np.argwhere((_pixels(view) != before).any(axis=-1))[:, ::-1]
+    return np.argwhere((shown_pixels(view) != before).any(axis=-1))[:, ::-1]
 
 
 def _nearest(view, before, position) -> float:
@@ -45,7 +39,7 @@ def _nearest(view, before, position) -> float:
 def test_a_marked_point_is_drawn_on_slices_near_it_and_goes_when_taken_away(window, plane) -> None:
     view = window.grid.slice_views[plane]
     window.workspace.view.set_crosshair(INSIDE)
-    before = _pixels(view)
+    before = shown_pixels(view)
     assert not window.commands.actions["head.forget_points"].isEnabled()
     assert window.commands.run("head.left")
     assert _nearest(view, before, INSIDE) < 8
@@ -59,7 +53,7 @@ def test_a_marked_point_is_drawn_on_bone_and_is_no_landmark(qtbot, window) -> No
     view = window.grid.scene_view
     view.view_from("A")
     wait_until_idle(qtbot, window)
-    before = _pixels(view)
+    before = shown_pixels(view)
     window.workspace.head.mark_point("midline", ON_BONE)
     wait_until_idle(qtbot, window)
     assert _nearest(view, before, ON_BONE) < 8

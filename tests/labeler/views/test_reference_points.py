@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from qtpy.QtCore import QPoint, Qt
-from qtpy.QtGui import QImage
 from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, image_bytes, wait_until_idle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, shown_pixels, wait_until_idle
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -47,11 +46,6 @@ def shown(qtbot, window, tmp_path):
     return window
 
 
-def _pixels(view) -> np.ndarray:
-    image = view.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
-    return image_bytes(image).reshape(image.height(), image.width(), 4)[..., :3].astype(int)
-
-
 def _pixel(view, position) -> QPoint:
     x, y = view.pixel_at(position)
     return QPoint(round(x), round(y))
@@ -64,9 +58,9 @@ def test_they_are_drawn_on_slices_near_them_only(shown, plane) -> None:
     away[np.abs(plane.in_scan.normal).argmax()] = 4.0
     for crosshair, is_seen in ((at, True), (at + away, False)):
         shown.workspace.view.set_crosshair(crosshair)
-        before = _pixels(view)
+        before = shown_pixels(view)
         shown.workspace.references.clear()
-        changed = (_pixels(view) != before).any(axis=-1)
+        changed = (shown_pixels(view) != before).any(axis=-1)
         assert bool(changed.any()) == is_seen
         if is_seen:
             y, x = np.argwhere(changed).T
@@ -79,12 +73,12 @@ def test_they_are_drawn_on_bone_and_go_when_cleared(shown, qtbot) -> None:
     view = shown.grid.scene_view
     view.view_from("A")
     wait_until_idle(qtbot, shown)
-    before = _pixels(view)
+    before = shown_pixels(view)
     assert shown.commands.actions["file.clear_references"].isEnabled()
     assert shown.commands.run("file.clear_references")
     assert not shown.commands.actions["file.clear_references"].isEnabled()
     wait_until_idle(qtbot, shown)
-    y, x = np.argwhere((_pixels(view) != before).any(axis=-1)).T
+    y, x = np.argwhere((shown_pixels(view) != before).any(axis=-1)).T
     pixel = _pixel(view, ON_BONE)
     assert np.hypot(x - pixel.x(), y - pixel.y()).min() < 8
 

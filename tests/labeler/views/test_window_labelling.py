@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, wait_until_idle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, on_ball, wait_until_idle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
@@ -27,11 +27,6 @@ def drag(view, start: QPoint, end: QPoint, button=LEFT_BUTTON, modifiers=Qt.Keyb
     for part in (0.2, 0.6, 1.0):
         QTest.mouseMove(view, start + (end - start) * part)
     QTest.mouseRelease(view, button, modifiers, end)
-
-
-def on_ball(*direction: float) -> np.ndarray:
-    towards = np.array(direction, dtype=float)
-    return MIDDLE + BALL_MM * towards / np.linalg.norm(towards)
 
 
 @pytest.fixture
