@@ -41,8 +41,8 @@ _SMALLEST_ISLAND = 0.05
 _MOST_ISLANDS, _RIVAL_SHARE = 6, 0.2
 """Islands that are looked at by themselves, at most, and their size over that of the largest, at least."""
 
-_ALIKE, _APART_RADII = 0.4, 0.8
-"""Two heads: the smaller one over the larger one, and their distance over both radii, at least."""
+_APART_RADII = 0.8
+"""Distance of two heads over both radii, at least."""
 
 _FEWEST_VOXELS = 500
 _TAILS_PERCENT = (0.5, 99.9)
@@ -270,10 +270,9 @@ class Bone:
         return [together, *(cls(scan, threshold, numbers == i) for i in rivals if len(large) > 1)]
 
     def is_apart_from(self, other: Bone) -> bool:
-        """Whether a bone is about as large as another one, and lies beside it, not around or under it."""
-        sizes = sorted((len(self.index), len(other.index)))
+        """Whether a bone lies beside another one, not around or under it."""
         distance = float(np.linalg.norm(self.centre - other.centre))
-        return sizes[0] >= _ALIKE * sizes[1] and distance > _APART_RADII * (self.radius + other.radius)
+        return distance > _APART_RADII * (self.radius + other.radius)
 
     def with_what_is_near(self, everything: Bone, others: Sequence[Bone]) -> Bone:
         """Return the bone with what belongs to neither it nor others, but lies nearest to it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,6 +49,8 @@ quick one; what is farther behind is left."""
 
 _THIN_MARGIN = 0.03
 _MUCH_THICKER = 2.0
+_FAILED = "the head could not be straightened by its symmetry"
+_BESIDE = "another large part of bone lies beside the head: check that this is the head that you mean"
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +58,8 @@ class _Found:
     plane: MidPlane
     confidence: Confidence
     bone: Bone
+    lies_beside: bool = False
+    """Whether another large part of bone lies beside it that is no head."""
 
     @property
     def accepted(self) -> bool:
@@ -122,14 +126,23 @@ def straighten(
     coarse = fine if coarse.grid.shape == fine.grid.shape else coarse  # as large: one is enough
     meant = None if near is None else np.asarray(near, dtype=np.float64).reshape(3)
     found = _mid_plane(fine, coarse, threshold, meant, volume, report.part(0.05, 0.7))
-    return pose_in_plane(
-        volume,
-        found.bone,
-        found.plane,
-        found.confidence,
-        template or phantom_template(),
-        report.part(0.7, 1.0),
-    )
+    known = template or phantom_template()
+    lying = front_and_up(found.bone, found.plane, known, report.part(0.7, 1.0))
+    _check_together(found, lying, volume)
+    pose = _posed(volume, found.bone, lying, found.confidence, known)
+    return replace(pose, warnings=(*pose.warnings, _BESIDE)) if found.lies_beside else pose
+
+
+def _check_together(found: _Found, lying: InPlane, volume: Volume) -> None:
+    """Raise `HeadPoseError` where neither the plane nor front and up are clear enough for each other."""
+    doubts = [lying.margin < _THIN_MARGIN, not _dense_in_front(found.bone, lying)]
+    if all(doubts):
+        raise HeadPoseError(f"{_FAILED}: it does not show which way is front and up", file=volume.path)
+    if any(doubts) and found.confidence.margin < _CLEAR[2]:
+        raise HeadPoseError(
+            f"{_FAILED}: it is nearly as symmetric in another plane, and the template does not decide",
+            file=volume.path,
+        )
 
 
 def _mid_plane(
@@ -143,9 +156,12 @@ def _mid_plane(
     """Return the first plane that can be trusted, over thresholds and islands of bone."""
     tried: list[_Found] = []
     for islands in _islands_at(_levels(coarse) if threshold is None else (threshold,), fine, coarse):
-        heads = _separate_heads(islands, report)
+        heads, n_apart = _separate_heads(islands, report)
+        if len(heads) > 1 and meant is None:
+            raise SeveralHeadsError([head.bone.centre for head in heads], file=volume.path)
         if heads:
-            return _meant_head(heads, meant, islands, volume, report)
+            found = _meant_head(heads, meant, islands, report)
+            return replace(found, lies_beside=n_apart > len(heads))
         for bone in islands.searched:
             found = _best_plane(bone, islands, report)
             tried.append(found)
@@ -198,21 +214,19 @@ def _islands_at(levels: Sequence[float], fine: CoarseScan, coarse: CoarseScan) -
     return found[::-1] if thickness[0] > _MUCH_THICKER * thickness[-1] else found
 
 
-def _separate_heads(islands: _Islands, report: Report) -> list[_Found]:
-    """Return the mid-plane of each head in a scan of several; nothing where there is one at most."""
+def _separate_heads(islands: _Islands, report: Report) -> tuple[list[_Found], int]:
+    """Return the mid-plane of each head beside another large part of bone, and how many such parts are."""
     rivals = islands.searched[1:]
     apart = [b for b in rivals if any(b.is_apart_from(other) for other in rivals if other is not b)]
-    heads = [found for found in (_best_plane(b, islands, report) for b in apart) if found.accepted]
-    return heads if len(heads) > 1 else []
+    found = [_best_plane(bone, islands, report) for bone in apart]
+    return [head for head in found if head.accepted], len(apart)
 
 
-def _meant_head(
-    heads: list[_Found], meant: FloatArray | None, islands: _Islands, volume: Volume, report: Report
-) -> _Found:
-    """Return the head that a point lies nearest to, with its jaw and what else lies near."""
-    if meant is None:
-        raise SeveralHeadsError([head.bone.centre for head in heads], file=volume.path)
-    own = min(heads, key=lambda head: float(np.linalg.norm(head.bone.centre - meant)))
+def _meant_head(heads: list[_Found], meant: FloatArray | None, islands: _Islands, report: Report) -> _Found:
+    """Return the only head, or the one that a point lies nearest to, with its jaw and what else is near."""
+    own = heads[0]
+    if meant is not None:
+        own = min(heads, key=lambda head: float(np.linalg.norm(head.bone.centre - meant)))
     others = [head.bone for head in heads if head is not own]
     found = _best_plane(own.bone.with_what_is_near(islands.searched[0], others), islands, report)
     return found if found.accepted else own
@@ -269,7 +283,7 @@ def _why(found: _Found) -> str:
         reason = f"only {100 * c.agreement:.0f} % of the bone meets its mirror image"
     else:
         reason = "it is nearly as symmetric in another plane"
-    return f"the head could not be straightened by its symmetry: {reason}"
+    return f"{_FAILED}: {reason}"
 
 
 def pose_in_plane(
@@ -280,10 +294,20 @@ def pose_in_plane(
     template: HeadTemplate,
     report: Report,
     *,
-    found_by: str = "symmetry",
+    found_by: str,
 ) -> HeadPose:
     """Return the pose of a head whose mid-plane is known; front, up and pitch are the template's."""
-    lying = front_and_up(bone, plane, template, report)
+    return _posed(volume, bone, front_and_up(bone, plane, template, report), confidence, template, found_by)
+
+
+def _posed(
+    volume: Volume,
+    bone: Bone,
+    lying: InPlane,
+    confidence: Confidence | None,
+    template: HeadTemplate,
+    found_by: str = "symmetry",
+) -> HeadPose:
     warnings = []
     if lying.margin < _THIN_MARGIN or not _dense_in_front(bone, lying):
         warnings.append("front and up are uncertain: check that the nose points forward and the teeth down")
