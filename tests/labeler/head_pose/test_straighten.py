@@ -166,6 +166,26 @@ def test_of_two_heads_none_is_chosen_until_somebody_says_which_one_is_meant():
     np.testing.assert_allclose(pose.T_head_scan.rotation, found().T_head_scan.rotation, atol=0.05)
 
 
+def test_a_large_thing_beside_the_head_is_spoken_of():
+    volume = head(names=USUAL).volume
+    z, y, x = np.indices(volume.array.shape) - np.array(volume.array.shape)[:, None, None, None] / 2
+    ball = np.where(abs(np.sqrt(x**2 + y**2 + z**2) - 24) < 3, 30_000, 2_500).astype(np.uint16)
+    pose = straighten(Volume(np.concatenate([volume.array, ball], axis=2), volume.T_scan_voxel))
+    assert pose.mid_plane.angle_to_deg(true_plane(head(names=USUAL))) < 0.6
+    assert any("beside the head" in warning for warning in pose.warnings)
+
+
+def test_a_template_that_cannot_tell_front_from_back_is_not_believed():
+    around = np.random.default_rng(5).normal(size=(3000, 3))
+    ball = HeadTemplate(18 * around / np.linalg.norm(around, axis=1, keepdims=True), 18.0, "a ball")
+    said = ""
+    try:
+        said = " ".join(straighten(head(names=USUAL).volume, template=ball).warnings)
+    except HeadPoseError as refused:
+        said = str(refused)
+    assert "front and up" in said
+
+
 def test_a_point_in_the_only_head_changes_nothing():
     near = straighten(head(names=USUAL).volume, near=[5.0, 5.0, 5.0])
     np.testing.assert_allclose(near.T_head_scan.matrix, found().T_head_scan.matrix)

@@ -249,6 +249,19 @@ def test_who_labels_is_asked_which_side_is_left_until_it_is_answered(window) -> 
     assert window.workspace.head.frame.left_confirmed
 
 
+def test_the_card_waits_with_its_question_until_the_head_is_turned(window) -> None:
+    window.set_step("scan")
+    card = window.findChild(HeadCard)
+    window.workspace.document.do(SetHeadFrame(head_frame()))
+    window.commands.run("head.by_hand")
+    assert not card.confirm.isVisible()
+    assert not card.take_planes.isVisible()  # each drag is taken by itself
+    assert card.mid_plane.isVisible()
+    window.commands.run("head.by_hand")
+    assert card.confirm.isVisible()
+    assert not card.mid_plane.isVisible()
+
+
 def test_the_card_says_how_the_head_lies_and_asks_which_side_is_left(window) -> None:
     window.set_step("scan")
     card = window.findChild(HeadCard)

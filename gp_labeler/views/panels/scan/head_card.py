@@ -89,15 +89,18 @@ class HeadCard(Card):
         if wrong:
             rest = f", and {len(wrong) - 1} more on the wrong side too" if len(wrong) > 1 else ""
             self._notices.addWidget(Notice("warning", f"{wrong[0]}{rest}. Are left and right exchanged?"))
-        if head.asks_left:
+        is_turning = workspace.interaction.tool == "turn"
+        asks_left = head.asks_left and not is_turning  # first the head is turned
+        if asks_left:
             self._notices.addWidget(Notice("info", head.left_text))
-        self._answers.setVisible(head.asks_left)
+        self._answers.setVisible(asks_left)
         self.shown.setVisible(head.frame is not None)
         self.stop.setVisible(head.is_running)
         self.straighten.setVisible(not head.is_running)
         self.straighten.setText("Straighten again" if head.frame is not None else "Straighten")
-        turned = workspace.view.planes_are_turned or workspace.interaction.tool == "turn"
-        self._hand.setVisible(turned)
+        is_turned = workspace.view.planes_are_turned
+        self._hand.setVisible(is_turned or (is_turning and head.frame is not None))
+        self.take_planes.setVisible(is_turned)
         self.mid_plane.setVisible(head.frame is not None)
         self.forget_points.setVisible(bool(head.points))
         for name, button in self.points.items():
