@@ -87,7 +87,7 @@ def straighten_by_landmarks(
     if bone is not None and confidence is not None:
         lying = front_and_up(bone, plane, template or phantom_template(), _SILENT)
         if float(lying.axes[:, 2] @ axes[:, 2]) < 0:
-            warnings.append("the bone looks upside down: are left and right exchanged?")
+            warnings.append("the bone looks upside down: check whether left and right are exchanged")
     return HeadPose(
         RigidTransform.from_parts(axes, origin, dst="scan", src="head").inverse(),
         "landmarks",

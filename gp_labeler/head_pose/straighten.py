@@ -135,10 +135,10 @@ def straighten(
 
 def _check_together(found: _Found, lying: InPlane, volume: Volume) -> None:
     """Raise `HeadPoseError` where neither the plane nor front and up are clear enough for each other."""
-    doubts = [lying.margin < _THIN_MARGIN, not _dense_in_front(found.bone, lying)]
-    if all(doubts):
+    unclear = [lying.margin < _THIN_MARGIN, not _dense_in_front(found.bone, lying)]
+    if all(unclear):
         raise HeadPoseError(f"{_FAILED}: it does not show which way is front and up", file=volume.path)
-    if any(doubts) and found.confidence.margin < _CLEAR[2]:
+    if any(unclear) and found.confidence.margin < _CLEAR[2]:
         raise HeadPoseError(
             f"{_FAILED}: it is nearly as symmetric in another plane, and the template does not decide",
             file=volume.path,

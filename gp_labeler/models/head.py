@@ -74,6 +74,7 @@ class HeadModel:
         """File and order of slices of a scan that shall be straightened once it is open."""
         self.refusal = ""
         """Why the last attempt found nothing, and what to do; empty where it did."""
+        self._warned: tuple[HeadFrame | None, tuple[str, ...]] = None, ()
         self.heads: tuple[Position, ...] = ()
         """Of a scan of several heads, a point in each, mm, until one was chosen; else nothing."""
         document.reset.connect(self._on_reset)
@@ -105,6 +106,13 @@ class HeadModel:
     def asks_left(self) -> bool:
         """Whether it is still to be confirmed which side is left."""
         return self.frame is not None and not self.frame.left_confirmed
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should look at in the head frame as it was found, until it is another."""
+        frame, warnings = self._warned
+        is_same = frame is not None and self.frame is not None and frame.matrix == self.frame.matrix
+        return warnings if is_same else ()
 
     @property
     def points(self) -> Mapping[str, Position]:
@@ -310,6 +318,7 @@ class HeadModel:
             SetHeadFrame(HeadFrame(frame.matrix, pose.found_by, pose.pitch, pose.left, left_is_known))
         )
         self._points.clear()
+        self._warned = self.frame, pose.warnings
         words = [
             f"The head lies {pose.tilt_deg:.0f}° from the axes of its scan; the views are now aligned with it"
         ]

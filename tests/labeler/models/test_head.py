@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from document_cases import head_frame, text_of
@@ -148,6 +150,16 @@ def test_of_several_heads_the_user_says_which_one_is_meant(workspace, monkeypatc
     assert workspace.head.frame.matrix == HEAD.matrix
     assert workspace.head.heads == ()
     np.testing.assert_allclose(workspace.view.crosshair, [22, 3, 0], atol=workspace.scan.volume.spacing[0])
+
+
+def test_what_is_to_be_looked_at_is_kept_until_the_frame_is_another(workspace, monkeypatch) -> None:
+    straightened(workspace, monkeypatch, replace(POSE, warnings=("the bone looks upside down",)))
+    assert workspace.head.warnings == ("the bone looks upside down",)
+    workspace.head.show(False)
+    workspace.head.confirm_left()
+    assert workspace.head.warnings
+    workspace.head.turn("roll", np.pi)
+    assert workspace.head.warnings == ()
 
 
 def test_a_cancelled_search_changes_nothing(workspace, monkeypatch) -> None:

@@ -9,7 +9,7 @@ from gp_labeler.document.state import Position
 from gp_labeler.models.head import FREE_POINTS
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit
-from gp_labeler.views.formatting import position_text
+from gp_labeler.views.formatting import position_text, sentence
 from gp_labeler.views.panels.action_button import Actions, action_button, do_action
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, Notice, emptied, text_label
@@ -85,6 +85,8 @@ class HeadCard(Card):
         self._offer_heads()
         if head.refusal and not head.heads:
             self._notices.addWidget(Notice("warning", head.refusal))
+        for warning in head.warnings:
+            self._notices.addWidget(Notice("warning", sentence(warning)))
         wrong = head.wrong_sides()
         if wrong:
             rest = f", and {len(wrong) - 1} more on the wrong side too" if len(wrong) > 1 else ""
