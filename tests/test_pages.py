@@ -10,6 +10,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -42,6 +43,9 @@ _COMMAND = re.compile(r"^(?:\$ )?(gp-(?:core|labeler) .+)$", re.MULTILINE)
 _BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _TABLE = re.compile(r"^```toml\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
+_MARKED = re.compile(r"<!-- not run: (gp-\w+ .+?): .+? -->")
+"""A command that a page says is not run by the tests, and why."""
+
 _OWN_PROCESS = ("offscreen", "reproduce")
 """Pages whose blocks are scripts with a window, or with worker processes."""
 
@@ -67,6 +71,26 @@ def test_every_command_line_is_understood(page: str, line: str, tmp_path: Path, 
         with contextlib.suppress(_CompletedError):
             _parse(program, words)
     assert "error" not in capsys.readouterr().err
+
+
+def _core_commands() -> list[tuple[str, str]]:
+    """Return the commands of the core that are run: those that no page marks, and without other programs."""
+    marked = {line for page in _PAGES for line in _MARKED.findall(page.read_text(encoding="utf-8"))}
+    howto = {page.stem for page in _PAGES if page.parent.name == "howto"}  # run by test_tutorials
+    rows = [(page, line) for page, line in _commands() if page not in howto and line not in marked]
+    return [(page, line) for page, line in rows if line.startswith("gp-core ") and not set("|<>") & set(line)]
+
+
+@pytest.mark.parametrize(("page", "line"), _core_commands())
+def test_every_command_of_the_core_runs(page: str, line: str, folder, tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("docs", "labelled", "reliability.json"):
+        if f"--json {name}" not in line:
+            Path(name).symlink_to(folder / name)
+    if "--csv touches.csv" not in line:
+        shutil.copy(_DOCS / "example" / "touches.csv", tmp_path)
+    status = main(shlex.split(line)[1:])
+    assert status in ((0, 1) if line.startswith("gp-core check") else (0,)), capsys.readouterr().err
 
 
 class _CompletedError(Exception):

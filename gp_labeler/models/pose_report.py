@@ -32,7 +32,10 @@ _WAYS = {
     "placed": "touches placed on it",
     "known": "a registration given with the touches",
 }
-_WITHHELD = "Until they agree, nothing is sent to a robot, and no file for a robot is written."
+_WITHHELD = (
+    "Until they agree, nothing is sent to a robot, and files for a robot are written only after the estimate "
+    "is accepted."
+)
 _GOOD, _BAD, _QUIET, _RULE = "#1b7f4b", "#b3361f", "#5d6670", "#d5dae0"
 _TABLE = '<table cellspacing="0" cellpadding="0" style="margin-left: 0px; margin-right: 0px">'
 _BAR_PX, _BAR_MM = 80, 2.0
