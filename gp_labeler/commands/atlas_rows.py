@@ -47,6 +47,6 @@ def atlas_rows() -> Iterator[Action]:
     yield row("save_reliability", "Save repeatability…", IN_WINDOW,
               lambda w: w.reliability.report is not None, group="repeat", icon="save",
               hint="Table (.csv), full result (.json), or plot (.png, .pdf, .svg)")
-    yield row("try", "Leave-one-out", lambda w: w.atlas.try_out(), _can_try, group="try", icon="play",
+    yield row("try", "Run leave-one-out", lambda w: w.atlas.try_out(), _can_try, group="try", icon="play",
               hint="Estimates each animal's cochlea from the other animals")
 # fmt: on

@@ -304,7 +304,7 @@ def view_rows() -> Iterator[Action]:
               IN_WINDOW, group="bone")
     yield row("view.canvas", "3D canvas…", (), IN_WINDOW, group="theme",
               hint="Painted or native drawing of the 3D view, from the next start on")
-    yield row("view.theme", "Dark or light", ("Ctrl+T",), IN_WINDOW, group="theme",
+    yield row("view.theme", "Dark or light theme", ("Ctrl+T",), IN_WINDOW, group="theme",
               icon="moon")
     for title, id, keys in _TEXT_SIZES:
         yield row(f"view.text_{id}", title, keys, IN_WINDOW, group="text",

@@ -13,7 +13,7 @@ __all__ = ["slab_rows"]
 
 _FIRST_MM, _FACTOR = 0.5, 2.0**0.5
 _WORDS = {"mean": "Mean", "maximum": "Maximum", "minimum": "Minimum"}
-_DENOISE = {"median": "Median", "gaussian": "Gaussian", "bilateral": "Bilateral (keeps edges)"}
+_DENOISE = {"median": "median", "gaussian": "Gaussian", "bilateral": "bilateral (keeps edges)"}
 _KEYS = {"mean": "Shift+T", "median": "Shift+G"}
 
 
@@ -74,6 +74,6 @@ def slab_rows() -> Iterator[Action]:
     yield row("slab_thinner", "Slab: thinner", ("Alt+[",), _thicken(1 / _FACTOR), _has_slab)
     for kind in DENOISERS:
         keys = (_KEYS[kind],) if kind in _KEYS else ()
-        yield row(f"denoise_{kind}", f"Denoise: {_DENOISE[kind].lower()}", keys, _toggle_denoise(kind),
+        yield row(f"denoise_{kind}", f"Denoise: {_DENOISE[kind]}", keys, _toggle_denoise(kind),
                   checked=_is_denoised(kind), hint="In the plane of the slice; display only")
 # fmt: on

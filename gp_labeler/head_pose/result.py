@@ -15,7 +15,9 @@ from gp_labeler.head_pose.mid_plane import MidPlane
 
 __all__ = ["Confidence", "HeadPose", "HeadPoseError", "SeveralHeadsError"]
 
-_REMEDY = "Place IN and a pair such as OI, and straighten by landmarks; or give a box around the head."
+_REMEDY = (
+    "Place IN and a pair such as OI, and straighten by landmarks; or give three points: midline, left, right."
+)
 
 
 class HeadPoseError(GpError):

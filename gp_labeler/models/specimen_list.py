@@ -29,6 +29,7 @@ FILTERS = ("all", "unfinished", "not begun", "finished", "doubtful", "repeated",
 
 _LISTING = "list specimens"
 _MOST_FOLDERS = 20
+_NO_FOLDERS = "Add a folder to list its specimens and scans, with their progress"
 
 
 class SpecimenListModel:
@@ -99,7 +100,7 @@ class SpecimenListModel:
         """Such as ``12 of 40 specimens, 7 finished, 3 not begun``."""
         n, shown = len(self._every), len(self.rows)
         if not n:
-            return "No specimens yet" if self.folders else "Add a folder of specimens or scans"
+            return "No specimens yet" if self.folders else _NO_FOLDERS
         many = "" if n == 1 else "s"
         count = f"{n} specimen{many}" if shown == n else f"{shown} of {n} specimens"
         return f"{count}, {progress_text(self._every)}"

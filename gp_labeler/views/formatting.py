@@ -10,6 +10,7 @@ from gp_core.landmarks.suggestion import Suggestion
 __all__ = [
     "NONE",
     "TIMES",
+    "bytes_text",
     "capitalised",
     "degrees_text",
     "mm_text",
@@ -80,6 +81,14 @@ def position_text(position: Iterable[float]) -> str:
 def value_text(value: float | None) -> str:
     """Return a grey value with as many digits as it has a meaning for."""
     return NONE if value is None or not math.isfinite(value) else f"{value:.5g}".replace("-", _MINUS)
+
+
+def bytes_text(n_bytes: int) -> str:
+    """Return a size in memory or on disk such as ``62 kB`` or ``1.2 GB``."""
+    for unit, size in (("GB", 2**30), ("MB", 2**20)):
+        if n_bytes >= size:
+            return f"{n_bytes / size:.3g} {unit}"
+    return f"{n_bytes / 2**10:.0f} kB"
 
 
 def size_text(size: Sequence[int]) -> str:

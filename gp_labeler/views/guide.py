@@ -108,7 +108,7 @@ class GuideWindow(QWidget):
         set_role(self.trust, f"large-{trust.level}")
         for label in (self.trust, self.reason):
             label.show()
-        self.result.setText(f"±{estimate.radius_95:.2f} mm · ±{degrees_text(estimate.cone_95)}")
+        self.result.setText(f"{estimate.radius_95:.2f} mm · {degrees_text(estimate.cone_95)}")
         self.warning.setText("\n".join(sentence(words) for words in estimate.warnings[:2]))
         self.warning.setVisible(bool(estimate.warnings))
 
@@ -183,7 +183,7 @@ class GuideWindow(QWidget):
         self.result, self.warning = text_label(role="large"), text_label(role="big-warning", wrap=True)
         self.trust, self.reason = text_label(), text_label(role="big", wrap=True)
         self.state, self.told = text_label(wrap=True), text_label(role="large-danger", wrap=True)
-        self.caption = text_label("Cochlea, within 95 %", "large-hint")
+        self.caption = text_label("Cochlea, 95 % within", "large-hint")
         self.picture = FeaturePicture()
         self.picture.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.progress = QProgressBar()

@@ -45,7 +45,7 @@ class ShortcutsSheet(QDialog):
         sheet = QWidget()
         sheet.setProperty("role", "panel")
         columns = FlowLayout(sheet, spacing=36)
-        columns.setContentsMargins(20, 12, 20, 12)
+        columns.setContentsMargins(12, 4, 12, 4)
         blocks = _blocks()
         for names in _COLUMNS:
             part = QWidget()
@@ -61,9 +61,9 @@ class ShortcutsSheet(QDialog):
         close.clicked.connect(self.accept)
         keys, foot = (
             scrolled(sheet, page="Keys and mouse gestures"),
-            in_row(STRETCH, close, margins=(20, 0, 20, 0)),
+            in_row(STRETCH, close, margins=(12, 0, 12, 0)),
         )
-        in_column(keys, foot, margins=(0, 8, 0, 12), of=self)
+        in_column(keys, foot, margins=(8, 8, 8, 12), of=self)
         open_at(self, 0, 760)
         hint = sheet.sizeHint()
         self.resize(min(hint.width() + 40, self.screen().availableSize().width()), self.height())

@@ -247,8 +247,17 @@ class _Work(QWidget):
         jobs = workspace.jobs
         for signal in (jobs.started, jobs.progressed, jobs.done, jobs.failed, jobs.cancelled):
             follow(self, signal, self._on_task)
-        self.stop.setIcon(icon("close", theme_of(self).muted, size=12))
+        self.take_theme()
         self._refresh()
+
+    def take_theme(self) -> None:
+        """Draw the button in the colours of the theme that is in effect."""
+        self.stop.setIcon(icon("close", theme_of(self).text, size=pixels(self, 12)))
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.StyleChange:
+            self.take_theme()
 
     def _fit(self) -> None:
         self.bar.setFixedWidth(pixels(self, 110))

@@ -61,6 +61,11 @@ QPushButton[role="primary"] {
 QPushButton[role="primary"]:hover { background: $accent_hover; }
 QPushButton[role="primary"]:focus { border: 2px solid $focus; padding: 4px 11px; }
 QPushButton[role="primary"]:disabled { background: transparent; border-color: $border; color: $faint; }
+QDialogButtonBox { button-layout: 3; }
+QDialogButtonBox QPushButton:default {
+    background: $accent; border-color: $accent; color: $on_accent; font-weight: 600;
+}
+QDialogButtonBox QPushButton:default:focus { border: 2px solid $focus; padding: 4px 11px; }
 QPushButton[role="huge"] { font-size: $px22; padding: 8px 20px; }
 QPushButton[role="huge-primary"] {
     font-size: $px28; font-weight: 600; background: $accent; border-color: $accent; color: $on_accent;

@@ -153,7 +153,7 @@ DARK = Theme(
     good="#6FE3B4",
     states=MappingProxyType(
         {
-            "to do": "#93A0AD",
+            "to do": "#98A5B2",
             "ghost": "#6FC1F8",
             "suggested": "#6FC1F8",
             "placed": "#F6A43C",

@@ -103,6 +103,8 @@ class TopBar(QWidget):
         row.addSpacing(6)
         row.addWidget(self.about)
         row.addStretch(1)
+        row.addWidget(self.saved)
+        row.addSpacing(8)
         for id, picture, word in _TOOLS:
             row.addWidget(self._button(id, picture, word))
         row.addSpacing(10)
@@ -112,14 +114,13 @@ class TopBar(QWidget):
         row.addSpacing(10)
         row.addWidget(self._button("view.four-up", "layout", "Four views"))
         row.addWidget(self._button("view.theme", "moon"))
-        row.addSpacing(8)
-        row.addWidget(self.saved)
         fit(self, self._fit)
 
     def _fit(self) -> None:
         """Keep the place of what changes, so that nothing beside it moves."""
         self.setFixedHeight(line_height(self) + pixels(self, 26))
         self.saved.setFixedWidth(text_width(self, _UNSAVED, _SAVED, _COPY))
+        self.saved.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         for button, _ in self._icons:
             button.setIconSize(QSize(pixels(self, 16), pixels(self, 16)))
             if button.text():

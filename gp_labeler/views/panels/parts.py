@@ -36,6 +36,7 @@ __all__ = [
     "column_of_captions",
     "emptied",
     "fix_headers",
+    "keep_room",
     "lay_out_hidden",
     "open_at",
     "scrolled",
@@ -199,6 +200,13 @@ def lay_out_hidden(content: QWidget) -> None:
         layout = widget.layout()
         if layout is not None:
             layout.activate()
+
+
+def keep_room(widget: QWidget) -> None:
+    """Let a widget keep its room while it is hidden, so that nothing beside it moves."""
+    policy = widget.sizePolicy()
+    policy.setRetainSizeWhenHidden(True)
+    widget.setSizePolicy(policy)
 
 
 class Card(QWidget):

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from accessible import WORD_CONTRAST, contrast_of, menu_words, painted_words, words_of
 from qtpy.QtCore import QPoint
-from qtpy.QtWidgets import QApplication, QFileDialog, QMenu, QToolTip
+from qtpy.QtWidgets import QApplication, QFileDialog, QMenu, QMessageBox, QToolTip
 
 from gp_labeler.models.workflow import PointState
 from gp_labeler.scene.marks import LOOKED_AT, Mark, growth_of
 from gp_labeler.views.chips import SHAPES
 from gp_labeler.views.painting.marks import shape_of
-from gp_labeler.views.theme import THEMES
+from gp_labeler.views.theme import THEMES, contrast
 
 
 @pytest.fixture(params=THEMES)
@@ -49,6 +49,35 @@ def test_file_dialogs_stand_out(window) -> None:
     dialog.deleteLater()
     assert len(measured) > 3
     assert [each for each in measured if each[1] < WORD_CONTRAST] == []
+
+
+@pytest.mark.parametrize("theme", THEMES.values(), ids=THEMES)
+def test_every_colour_of_words_stands_out_on_every_ground_also_under_the_pointer(theme) -> None:
+    words = {name: getattr(theme, name) for name in _INKS} | theme.states
+    ratios = {
+        (ink, ground): contrast(colour, getattr(theme, ground))
+        for ink, colour in words.items()
+        for ground in _GROUNDS
+    }
+    assert {pair: ratio for pair, ratio in ratios.items() if ratio < WORD_CONTRAST} == {}
+
+
+_INKS = ("text", "muted", "faint", "accent_text", "warning", "danger", "good")
+_GROUNDS = ("window", "panel", "card", "raised", "hover", "field", "selected")
+
+
+def test_the_button_that_enter_means_looks_like_it_and_stands_last(window) -> None:
+    """In questions as in the program's own dialogs."""
+    box = QMessageBox(window)
+    save = box.addButton("Save", QMessageBox.ButtonRole.AcceptRole)
+    leave = box.addButton(QMessageBox.StandardButton.Cancel)
+    box.setDefaultButton(save)
+    box.show()
+    ground, theme = save.grab().toImage().pixelColor(save.width() // 2, 4), THEMES[window.theme_name]
+    box.close()
+    box.deleteLater()
+    assert save.x() > leave.x()
+    assert ground.name().upper() == theme.accent
 
 
 # Never by colour alone

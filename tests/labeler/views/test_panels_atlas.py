@@ -59,6 +59,15 @@ def folder(tmp_path):
     return write_animals(tmp_path / "animals", drawn_animals(3))
 
 
+def test_cards_follow_each_other_however_tall_the_panel_is(panel, qtbot) -> None:
+    panel.resize(panel.width(), 1700)
+    QApplication.processEvents()
+    ends = [card.mapTo(panel, QPoint()).y() for card in (panel.which, panel.labels, panel.own, panel.trial)]
+    heights = [card.height() for card in (panel.which, panel.labels, panel.own)]
+    gaps = np.diff(ends) - heights
+    assert gaps.max() == gaps.min() <= 8
+
+
 def cell(panel, code: str, column: int, role: int = Qt.ItemDataRole.DisplayRole):
     rows = panel.labels.table.rows
     return rows.data(rows.index(rows.codes.index(code), column), role)

@@ -58,6 +58,21 @@ def panel(workspace: Workspace, qtbot, asked) -> LabelPanel:
     return panel
 
 
+def test_the_next_action_stays_where_it_is_from_state_to_state(workspace, panel) -> None:
+    """So that one button can be clicked again and again."""
+    place(workspace, "CA", "CB", "RWP")
+    deliver(workspace)
+    workspace.labels.accept_all_ghosts(side=LEFT)
+    workspace.labels.mark_unseen(side=LEFT, code="OI")
+    tops = set()
+    for code in ("CA", "RWA", "MN", "OI", "DTL", "FPP"):
+        workspace.labels.set_active(Active(LEFT, code))
+        for _ in range(3):  # layouts inside layouts take a turn each
+            QApplication.processEvents()
+        tops.add(panel.card.primary.mapTo(panel, QPoint()).y())
+    assert len(tops) == 1
+
+
 def click_cell(qtbot, table: LandmarkTable, code: str, column: int) -> None:
     where = table.view.visualRect(table.model.index(index_of(code), column)).center()
     qtbot.mouseClick(table.view.viewport(), CLICK, pos=where)

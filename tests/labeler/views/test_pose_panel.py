@@ -318,7 +318,7 @@ def test_it_says_beforehand_what_leaving_out_changes(workspace, panel, qtbot):
     click(qtbot, panel, "MN", NAME)
     qtbot.waitUntil(lambda: bool(panel.touches.change.toolTip()))
     said = panel.touches.change.toolTip()
-    assert said == f"Without MN: CO {moved:.2f} mm, axis {turned:.1f}°"
+    assert said == f"Without MN, CO moves {moved:.2f} mm, the axis {turned:.1f}°"
     before = workspace.pose.estimate.pose
     click(qtbot, panel, "MN", USE)
     after = workspace.pose.estimate.pose
@@ -418,7 +418,7 @@ def test_a_side_that_is_undecided_is_offered_with_its_odds(workspace, panel, qtb
 def test_the_shared_error_is_the_users_and_stated_with_the_region(workspace, panel, qtbot):
     touch(workspace, *PROBE)
     assert panel.head.shared.text() == "0.2"
-    assert panel.result.one.allowance.text() == "With a shared error of 0.2 mm"
+    assert panel.result.one.allowance.text() == "It includes a shared error of 0.2 mm."
     before, origin = workspace.pose.estimate.pose.radius_95, workspace.pose.estimate.pose.origin
     panel.head.shared.setFocus()
     panel.head.shared.selectAll()
@@ -428,7 +428,7 @@ def test_the_shared_error_is_the_users_and_stated_with_the_region(workspace, pan
     assert (pose.shared_error, workspace.pose.settings.shared_error) == (0.8, 0.8)
     assert pose.radius_95 > 2 * before
     np.testing.assert_array_equal(pose.origin, origin)
-    assert panel.result.one.allowance.text() == "With a shared error of 0.8 mm"
+    assert panel.result.one.allowance.text() == "It includes a shared error of 0.8 mm."
     assert workspace.pose.gains()[0].radius_95_now == pytest.approx(pose.plain_radius_95)
     with pytest.raises(GpError, match="shared error must be from 0 to 20 mm"):
         workspace.pose.choose(shared_error=-1)

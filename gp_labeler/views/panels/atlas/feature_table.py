@@ -17,7 +17,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from gp_core.atlas.label_check import Deviation
+from gp_core.atlas.label_check import HEAD_MM, Deviation
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_labeler.document.edits import point_text
 from gp_labeler.models.workflow import PointState
@@ -152,7 +152,7 @@ class FeatureTableModel(QAbstractTableModel):
 def _words(found: Deviation | None) -> str:
     if found is None:
         return NONE
-    return f"{found.word.removesuffix(' mm')} · {found.n_sd:.1f}"
+    return f"{found.distance:.2f} · {found.n_sd:.1f}" if found.distance <= HEAD_MM else found.word
 
 
 class FeatureTable(QTableView):

@@ -94,6 +94,7 @@ class AtlasPanel(QWidget):
         self._is_wide = wide
         ways = QBoxLayout.Direction
         self._columns.setDirection(ways.LeftToRight if wide else ways.TopToBottom)
+        self._columns.setStretch(0, int(wide))  # below each other, the last column takes what is left
         column = self._left if wide else self._right
         for card in (self.own, self.trial, self.repeatability):
             for other in (self._left, self._right):

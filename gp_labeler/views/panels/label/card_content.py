@@ -174,7 +174,7 @@ def _status(labels: LabelsModel, side: Side, code: str, state: PointState) -> tu
     if state is PointState.SUGGESTED:
         said = suggestion_text(labels.document.landmarks(side).suggested[code])
         source = f" ({said})" if said else ""
-        return f"Not confirmed{source}. It counts once you confirm or correct it.", "ghost"
+        return f"Suggested{source}. Confirm or correct it.", "ghost"
     problem = labels.known_problems(side).get(code)
     if state is PointState.DOUBTFUL and problem is not None:
         return sentence(problem.text), "danger"

@@ -23,7 +23,7 @@ from gp_labeler.document.state import How
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
-from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.fonts import fit, line_height, pixels
 from gp_labeler.views.layouts import STRETCH, in_column, in_row, placed, wide
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.card_parts import link
@@ -37,7 +37,7 @@ from gp_labeler.views.theme import theme_of
 
 __all__ = ["FeatureCard"]
 
-_CHIP = 14
+_CHIP, _GAP = 14, 4
 _DOWN, _UP = "\N{BLACK DOWN-POINTING TRIANGLE}", "\N{BLACK UP-POINTING TRIANGLE}"
 _TALL = 350
 """From this height on the picture stands above the words, not beside; at the normal text size."""
@@ -137,7 +137,8 @@ class FeatureCard(QWidget):
         self._chip.setFixedSize(pixels(self, _CHIP), pixels(self, _CHIP))
         for button in self.sides.values():
             button.setMinimumWidth(pixels(self, 28))
-        self.picture.setMinimumSize(pixels(self, 96), pixels(self, 72))
+        help_height = 5 * line_height(self) + self.plane.sizeHint().height() + 2 * _GAP
+        self.picture.setMinimumSize(pixels(self, 96), help_height)  # the buttons below stay where they are
         self._show_chip()
 
     def _side_button(self, side: Side) -> QToolButton:
@@ -159,7 +160,7 @@ class FeatureCard(QWidget):
             self._mistakes,
             placed(self.plane, Qt.AlignmentFlag.AlignLeft),
             STRETCH,
-            spacing=4,
+            spacing=_GAP,
         )
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(10)
@@ -176,8 +177,8 @@ class FeatureCard(QWidget):
         layout.addLayout(heading)
         layout.addLayout(self._body, 1)
         layout.addLayout(status)
-        layout.addWidget(self.annotation)
         layout.addLayout(buttons)
+        layout.addWidget(self.annotation)  # last: the buttons stay where they are as it comes and goes
 
     def _listen(self) -> None:
         workspace = self._workspace

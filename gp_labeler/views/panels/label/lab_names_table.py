@@ -23,7 +23,7 @@ __all__ = ["LabNamesTable"]
 
 _UNDECIDED = "Choose a feature…"
 _LEFT_OUT = "Leave out"
-_EITHER_SIDE = "side as in the file"
+_EITHER_SIDE = "Side as in the file"
 
 
 class LabNamesTable(QWidget):

@@ -18,7 +18,7 @@ from gp_labeler.document.labelling_edits import labelling_text, next_round
 from gp_labeler.models.labellings import LabellingRow, labelling_rows
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
-from gp_labeler.views.panels.parts import open_at, text_label
+from gp_labeler.views.panels.parts import fix_headers, open_at, text_label
 from gp_labeler.views.signals import attempt, follow
 from gp_labeler.views.times import time_text
 
@@ -53,9 +53,9 @@ class LabellingsDialog(QDialog):
         self.table.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
         self.table.setSelectionMode(QTableWidget.SelectionMode.SingleSelection)
         self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-        self.table.verticalHeader().hide()
+        self.table.setShowGrid(False)
+        fix_headers(self.table)
         header = self.table.horizontalHeader()
-        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         self.table.itemSelectionChanged.connect(self._refresh_buttons)

@@ -76,7 +76,7 @@ class LandmarkImportDialog(QDialog):
     def _make_widgets(self) -> None:
         self.side = QComboBox()
         self.side.setAccessibleName("Side of the head")
-        self.side.addItem("as the files say", None)
+        self.side.addItem("As the files say", None)
         for side in Side:
             self.side.addItem(side.word, side)
         self.side.currentIndexChanged.connect(self._look)

@@ -37,7 +37,7 @@ from gp_labeler.views.theme import theme_of
 __all__ = ["DistanceMatrixModel", "DistanceMatrixView"]
 
 PAIR_ROLE = int(Qt.ItemDataRole.UserRole) + 1
-_WIDEST, _PAD, _CHIP, _ROWS_SHOWN = "00.0 ± 0.00", 8, 10, 7
+_WIDEST, _PAD, _CHIP, _ROWS_SHOWN = "00.0 ± 0.00", 8, 10, 6
 
 Index = QModelIndex | QPersistentModelIndex
 

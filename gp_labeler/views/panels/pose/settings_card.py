@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from qtpy.QtWidgets import QCheckBox, QLabel, QLineEdit, QWidget
+from qtpy.QtWidgets import QCheckBox, QLabel, QLayout, QLineEdit, QWidget
 
 from gp_core.constants import METHOD_NAMES
 from gp_core.landmarks.features import Side
@@ -12,6 +12,7 @@ from gp_labeler.views.fonts import fit, text_width
 from gp_labeler.views.layouts import STRETCH, in_row, wide
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Segments, link
+from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, ElidedLabel, breakable, text_label
 from gp_labeler.views.signals import attempt, follow
@@ -21,6 +22,8 @@ __all__ = ["EstimateSettingsCard"]
 _METHODS = {"robust": ("robust",), "jrmpc": ("jrmpc",), "both": ("robust", "jrmpc")}
 _NOISE, _SHARED, _EACH = "Probe noise", "Shared error", "Touches per feature"
 _MIDLINE = "Mid-plane points"
+_APART = (0, 0, 10, 0)
+"""Margins of a field that another may follow on its line."""
 _HINTS = {
     "robust": "Uses the names of the touches, and down-weights a wrong one",
     "jrmpc": "The published method; needs an atlas fitted here to labelled animals",
@@ -137,8 +140,10 @@ class EstimateSettingsCard(Card):
             self._named,
             in_row(wide(self.side, 2), wide(self.method, 3), spacing=12),
             in_row(_caption(_NOISE), self.noise, self.found, STRETCH, spacing=6),
-            in_row(_caption(_SHARED), self.shared, text_label("mm", "hint"), STRETCH, spacing=6),
-            in_row(_caption(_EACH), self.each, STRETCH, spacing=6),
+            _together(
+                in_row(_caption(_SHARED), self.shared, text_label("mm", "hint"), margins=_APART, spacing=6),
+                in_row(_caption(_EACH), self.each, margins=0, spacing=6),
+            ),
             self.ears,
             self._in_plane,
             in_row(_caption("Atlas"), wide(self.atlas), self.to_atlas, spacing=6),
@@ -166,6 +171,16 @@ class EstimateSettingsCard(Card):
     def _choose(self, **fields: object) -> None:
         attempt(self._workspace, lambda: self._workspace.pose.choose(**fields))
         self.refresh()
+
+
+def _together(*fields: QLayout) -> FlowLayout:
+    """Return fields beside each other, or below each other where there is no room."""
+    row = FlowLayout()
+    for field in fields:
+        holder = QWidget()
+        holder.setLayout(field)
+        row.addWidget(holder)
+    return row
 
 
 def _caption(name: str) -> QLabel:

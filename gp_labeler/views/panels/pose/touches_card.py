@@ -119,7 +119,7 @@ class TouchesCard(Card):
         self.add(self.notices)
         self._layout.setContentsMargins(1, 6, 1, 6)
         for item in (self._top, row):
-            item.setContentsMargins(11, 0, 8, 0)
+            item.setContentsMargins(11, 0, 11, 0)
         self.notices.setContentsMargins(11, 0, 11, 0)
         self.table.setStyleSheet("QTableView { border: none; border-radius: 0 }")
         self.add(self.table)

@@ -89,7 +89,11 @@ def fine_mm(length: float | None) -> str:
 def region_text(pose: CochleaPose) -> str:
     """Return the 95 % region in words; for JRMPC, which has none, the scatter of the animals."""
     within = "95 % within" if pose.method == "robust" else "Animals scatter by"
-    return f"{within} {fine_mm(pose.radius_95)}  ·  cone {degrees_text(pose.cone_95)}"
+    return f"{within} {_region(pose.radius_95, pose.cone_95)}"
+
+
+def _region(radius_mm: float, cone_rad: float) -> str:
+    return f"{fine_mm(radius_mm)}  ·  cone {degrees_text(cone_rad)}"
 
 
 def allowance_text(pose: CochleaPose) -> str:
@@ -99,11 +103,12 @@ def allowance_text(pose: CochleaPose) -> str:
     """
     if pose.shared_error is None:
         return ""
-    text = f"With a shared error of {pose.shared_error:g} mm"
+    shared = f"It includes a shared error of {pose.shared_error:g} mm."
     if not pose.is_multimodal:
-        return text
-    plain = f"{fine_mm(pose.plain_radius_95)}  ·  cone {degrees_text(pose.plain_cone_95)}"
-    return f"As named: {plain}\nThe region above covers several hypotheses. {text}"
+        return shared
+    region, plain = (_region(pose.radius_95, pose.cone_95), _region(pose.plain_radius_95, pose.plain_cone_95))
+    named = "" if plain == region else f" As named: {plain}."
+    return f"It covers several hypotheses.{named} {shared}"
 
 
 def ear_notices(ears: BothEars | None, *, wanted: bool) -> Iterator[tuple[str, ...]]:
@@ -165,9 +170,9 @@ def change_text(name: str, touch: Touch, change: tuple[float, float] | None) -> 
     """Return what leaving a touch out, or taking it in again, would change."""
     word = "With" if touch.left_out else "Without"
     if change is None:
-        return f"{word} {name}: no estimate" if name in CODES else ""
+        return f"{word} {name}, there is no estimate" if name in CODES else ""
     moved, turned = change
-    return f"{word} {name}: CO {fine_mm(moved)}, axis {turned:.1f}°"
+    return f"{word} {name}, CO moves {fine_mm(moved)}, the axis {turned:.1f}°"
 
 
 def touch_text(name: str, touch: Touch | None, estimate: SideEstimate | None) -> str:

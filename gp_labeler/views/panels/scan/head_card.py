@@ -60,11 +60,11 @@ class HeadCard(Card):
         self.stop = QPushButton("Stop")
         self.stop.clicked.connect(workspace.head.cancel)
         self.add(_row(self.straighten, self.stop, self.by_landmarks, self.by_hand))
-        self._lay_out_points(actions)
         self.take_planes = action_button(actions["head.take_planes"], "Use these planes")
         self.mid_plane = action_button(actions["head.take_mid_plane"], "Mid-plane to crosshair")
         self._hand = _row(self.take_planes, self.mid_plane)
         self.add(self._hand)
+        self._lay_out_points(actions)
         for signal in (
             workspace.head.changed,
             workspace.view.planes_changed,

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from qtpy.QtCore import Qt
-from qtpy.QtGui import QCloseEvent
+from qtpy.QtGui import QCloseEvent, QShowEvent
 from qtpy.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -24,7 +24,7 @@ from gp_labeler.jobs.runner import Task
 from gp_labeler.jobs.scan import InspectScan
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit
-from gp_labeler.views.formatting import sentence
+from gp_labeler.views.formatting import bytes_text, sentence
 from gp_labeler.views.layouts import in_column, in_row, wide
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
@@ -38,7 +38,6 @@ from gp_labeler.views.panels.parts import (
     text_label,
 )
 from gp_labeler.views.panels.scan.import_wording import (
-    MB,
     PreviewScan,
     bare,
     facts_of,
@@ -177,7 +176,7 @@ class ImportDialog(QDialog):
             self.stride.clear()
             for stride, words in _STRIDES.items():
                 bytes_ = plan.with_options(stride=stride).n_bytes
-                self.stride.addItem(f"{words}  ({bytes_ / MB:,.0f} MB of memory)", stride)
+                self.stride.addItem(f"{words}  ({bytes_text(bytes_)} of memory)", stride)
             self.stride.setCurrentIndex(max(0, self.stride.findData(plan.options.stride)))
             self.reverse.setChecked(plan.options.reverse)
         self.accepts = {}
@@ -296,6 +295,11 @@ class ImportDialog(QDialog):
         """Read nothing."""
         self._stop()
         super().reject()
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().showEvent(event)
+        for caption in self._captions.values():  # only now do the fields have their style
+            self._level(caption)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802 - Qt's name
         self._stop()

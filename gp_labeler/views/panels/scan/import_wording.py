@@ -11,11 +11,10 @@ from gp_labeler.imaging.preview import PreviewPlane, preview_planes
 from gp_labeler.imaging.readers import MAPPED_FROM, ImportPlan, Problem, read_preview
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.jobs.runner import Progress
-from gp_labeler.views.formatting import TIMES, size_text, spacing_text
+from gp_labeler.views.formatting import TIMES, bytes_text, size_text, spacing_text
 
-__all__ = ["MB", "PreviewScan", "bare", "facts_of", "remedy", "why_not"]
+__all__ = ["PreviewScan", "bare", "facts_of", "remedy", "why_not"]
 
-MB = 2**20
 _AXES = ("columns", "rows", "slices")
 """What the voxel axes i, j and k count."""
 
@@ -67,7 +66,7 @@ def _left(plan: ImportPlan) -> str:
 
 
 def _memory(plan: ImportPlan) -> str:
-    taken = f"{plan.n_bytes / MB:,.0f} MB"
+    taken = bytes_text(plan.n_bytes)
     if plan.is_unpacked_to_disk:
         return f"unpacked on disk, {taken}"
     return f"stays in its file, {taken}" if plan.stays_in_file and plan.n_bytes >= MAPPED_FROM else taken

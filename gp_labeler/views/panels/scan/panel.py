@@ -7,7 +7,7 @@ from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.formatting import TIMES, sentence, size_text, spacing_text
+from gp_labeler.views.formatting import TIMES, bytes_text, sentence, size_text, spacing_text
 from gp_labeler.views.layouts import in_column
 from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
@@ -96,19 +96,12 @@ def facts_of(volume: Volume) -> dict[str, str]:
         "Name": volume.name,
         "Voxels": f"{size_text(volume.size)} of {spacing_text(volume.spacing)}",
         "Size": f"{lengths} mm",
-        "Values": f"{volume.dtype}, {_memory(volume.voxels.nbytes)} in {place}",
+        "Values": f"{volume.dtype}, {bytes_text(volume.voxels.nbytes)} in {place}",
         "Axes": _axes(volume),
     }
     if volume.path is not None:
         facts["File"] = str(volume.path.name)
     return facts
-
-
-def _memory(n_bytes: int) -> str:
-    for unit, size in (("GB", 2**30), ("MB", 2**20)):
-        if n_bytes >= size:
-            return f"{n_bytes / size:.3g} {unit}"
-    return f"{n_bytes / 2**10:.0f} kB"
 
 
 def _axes(volume: Volume) -> str:

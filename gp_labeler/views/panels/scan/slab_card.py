@@ -7,7 +7,7 @@ from qtpy.QtWidgets import QComboBox, QGridLayout, QWidget
 from gp_labeler.imaging.slab import Slab
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.number_field import NumberField
-from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.panels.parts import Card, keep_room, text_label
 from gp_labeler.views.signals import attempt, blocked, follow
 
 __all__ = ["SlabCard"]
@@ -38,13 +38,15 @@ class SlabCard(Card):
         self.thickness.step = 0.1
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
-        for column, (name, field) in enumerate((("Slab", self.mode), ("mm", self.thickness))):
-            grid.addWidget(text_label(name, "hint"), 0, 2 * column)
-            grid.addWidget(field, 0, 2 * column + 1)
+        self._unit = text_label("mm", "hint")
+        for widget in (self.thickness, self._unit):
+            keep_room(widget)
+        for column, widget in enumerate((text_label("Slab", "hint"), self.mode, self.thickness, self._unit)):
+            grid.addWidget(widget, 0, column)
         grid.addWidget(text_label("Denoise", "hint"), 1, 0)
         grid.addWidget(self.denoise, 1, 1)
         grid.setColumnStretch(1, 2)
-        grid.setColumnStretch(3, 1)
+        grid.setColumnStretch(2, 1)
         self.add(grid)
         self.add(text_label("Display only: values, bone edge and clicks use the slice.", "hint", wrap=True))
         self.mode.activated.connect(self._on_slab)
@@ -61,7 +63,8 @@ class SlabCard(Card):
             mode = "" if state.slab is None else state.slab.mode
             self.mode.setCurrentIndex(list(_MODES.values()).index(mode))
             self.denoise.setCurrentIndex(list(_KINDS.values()).index(state.denoise or ""))
-        self.thickness.setEnabled(state.slab is not None)
+        for widget in (self.thickness, self._unit):
+            widget.setVisible(state.slab is not None)
         self.thickness.set_value(None if state.slab is None else state.slab.mm)
 
     def _on_slab(self, _: object) -> None:

@@ -74,7 +74,7 @@ class TrackerDialog(QDialog):
             follow(self, signal, self.refresh)
         self._recall()
         self.refresh()
-        open_at(self, 560, 640)
+        open_at(self, 560, 710)
 
     # What it shows
 
