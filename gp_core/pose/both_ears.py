@@ -255,6 +255,25 @@ class EarComparison:
             return pose
         return replace(pose, inputs=replace(inputs, other_ear=replace(inputs.other_ear, combined=True)))
 
+    @checks_arguments
+    def combined_covariance(self, side: Side, covariance: FloatArray) -> FloatArray:
+        """Return the covariance of a side once its axis is combined with that of the other ear.
+
+        Parameters
+        ----------
+        side : Side
+            Which ear.
+        covariance : (6, 6) array
+            Of its own pose, such as after one more touch: origin (mm) and rotation vector (rad), in the frame
+            of the first ear.
+
+        Returns
+        -------
+        (6, 6) array
+            The same as `fused` has, where the pose has that covariance.
+        """
+        return _combination(covariance, self.poses[side].axis, self.poses[side.other], self.check.plane)[1]
+
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison for a JSON file, mm and degrees.
 
@@ -480,37 +499,44 @@ def _comparison_by(plane: MirrorPlane, left: CochleaPose, right: CochleaPose) ->
 
 
 def _fused(pose: CochleaPose, other: CochleaPose, plane: MirrorPlane) -> CochleaPose:
-    own = pose.covariance[3:, 3:]
-    reflection = np.eye(3) - 2 * np.outer(plane.normal, plane.normal)
-    # a rotation vector is a pseudo-vector: it mirrors with the opposite sign, its covariance without
-    mirrored = reflection @ other.covariance[3:, 3:] @ reflection.T
-    theirs = mirrored + _of_plane(plane)
-    common = _CORRELATION * min(own, mirrored, key=lambda one: float(np.trace(one)))
+    gain, covariance = _combination(pose.covariance, pose.axis, other, plane)
     axis = plane.mirror_direction(other.axis)
-    turn = np.cross(pose.axis, axis)  # the least rotation from one axis to the other, for small angles
-    across = np.eye(3) - np.outer(pose.axis, pose.axis)  # nothing is said of the rotation about the axis
-    # the best linear combination of two estimates whose errors have a covariance in common
-    total = across @ (own + theirs - 2 * common) @ across
-    gain = across @ (own - common) @ across @ np.linalg.pinv(total, rcond=1e-9, hermitian=True)
-    step = gain @ turn
+    step = gain @ np.cross(pose.axis, axis)  # the least rotation from one axis to the other, for small angles
     angle = float(np.linalg.norm(step))
     rotation = _rotation(step, angle) @ pose.transform_to_touches.rotation
     turned = RigidTransform.from_parts(
         rotation, pose.origin, dst=pose.transform_to_touches.dst, src="cochlea"
     )
-    left_over = np.eye(3) - gain
-    covariance = pose.covariance.copy()
-    shared = left_over @ common @ gain.T
-    covariance[3:, 3:] = left_over @ own @ left_over.T + gain @ theirs @ gain.T + shared + shared.T
-    covariance[:3, 3:] = covariance[:3, 3:] @ left_over.T
-    covariance[3:, :3] = covariance[:3, 3:].T
     return replace(
         pose,
         transform_to_touches=turned,
-        covariance=(covariance + covariance.T) / 2,
+        covariance=covariance,
         of_both_ears=True,
         inputs=None,
     )
+
+
+def _combination(
+    covariance: FloatArray, axis: FloatArray, other: CochleaPose, plane: MirrorPlane
+) -> tuple[FloatArray, FloatArray]:
+    """Return the weight of the other ear's axis, (3, 3), and the covariance of the combined pose, (6, 6)."""
+    own = covariance[3:, 3:]
+    reflection = np.eye(3) - 2 * np.outer(plane.normal, plane.normal)
+    # a rotation vector is a pseudo-vector: it mirrors with the opposite sign, its covariance without
+    mirrored = reflection @ other.covariance[3:, 3:] @ reflection.T
+    theirs = mirrored + _of_plane(plane)
+    common = _CORRELATION * min(own, mirrored, key=lambda one: float(np.trace(one)))
+    across = np.eye(3) - np.outer(axis, axis)  # nothing is said of the rotation about the axis
+    # the best linear combination of two estimates whose errors have a covariance in common
+    total = across @ (own + theirs - 2 * common) @ across
+    gain = across @ (own - common) @ across @ np.linalg.pinv(total, rcond=1e-9, hermitian=True)
+    left_over = np.eye(3) - gain
+    combined = covariance.copy()
+    shared = left_over @ common @ gain.T
+    combined[3:, 3:] = left_over @ own @ left_over.T + gain @ theirs @ gain.T + shared + shared.T
+    combined[:3, 3:] = covariance[:3, 3:] @ left_over.T
+    combined[3:, :3] = combined[:3, 3:].T
+    return gain, (combined + combined.T) / 2
 
 
 def _of_plane(plane: MirrorPlane) -> FloatArray:

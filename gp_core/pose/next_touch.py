@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from gp_core.constants import MM_PER_DEGREE
 from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import EXTERNAL, Side
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.pose.both_ears import EarComparison
 from gp_core.pose.covariance import cone_95, radius_95
 from gp_core.pose.robust import defining_points, pose_covariance, touch_model
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM, SystematicError
@@ -56,6 +58,7 @@ def gains(
     *,
     probe_noise: float | None = None,
     shared_error: float = DEFAULT_SHARED_ERROR_MM,
+    ears: EarComparison | None = None,
 ) -> tuple[TouchGain, ...]:
     """Return what each external feature not yet touched would gain, the best first.
 
@@ -74,6 +77,9 @@ def gains(
         Scale of an ordinary touch error, mm per coordinate; by default estimated from the touches.
     shared_error : float
         As for `gp_core.pose.estimate.estimate_pose`, mm.
+    ears : EarComparison, optional
+        If the axis is combined with that of the other ear: `gp_core.pose.both_ears.compare_ears` of these
+        touches, as the first ear, and of the other one's.
 
     Returns
     -------
@@ -84,6 +90,8 @@ def gains(
     ------
     FeatureError, GeometryError
         No pose can be estimated from the touches; see `gp_core.pose.robust.estimate_robust`.
+    GpError
+        The two ears disagree, so that their axes are not combined.
 
     Examples
     --------
@@ -94,23 +102,32 @@ def gains(
     """
     model = touch_model(touches, atlas, probe_noise)
     fit = fit_named_points(model, mirror_right(touches.array(model.codes), touches.side))
-    systematic = SystematicError(shared_error)
-    radius, cone = _regions(atlas, model, fit, systematic)
+    region = partial(_region, atlas, touches.side, SystematicError(shared_error), ears)
+    joined = None if ears is None else ears.fused(touches.side)
+    radius, cone = region(model, fit) if joined is None else (joined.plain_radius_95, joined.plain_cone_95)
     found = []
     for code in EXTERNAL:
         if code in atlas.codes and code not in model.codes:
-            after = _regions(atlas, *_with_touch(atlas, model, fit, code), systematic)
+            after = region(*_with_touch(atlas, model, fit, code))
             found.append(TouchGain(code, *after, radius, cone))
     return tuple(sorted(found, key=lambda gain: -gain.worth))
 
 
-def _regions(
-    atlas: Atlas, model: TouchModel, fit: NamedFit, systematic: SystematicError
+def _region(
+    atlas: Atlas,
+    side: Side,
+    systematic: SystematicError,
+    ears: EarComparison | None,
+    model: TouchModel,
+    fit: NamedFit,
 ) -> tuple[float, float]:
-    """Return radius and cone of the pose of a fit; both are the same in the mirror image."""
+    """Return radius and cone of the pose of a fit, with the axis of both ears where these are given."""
     defining = defining_points(atlas, model, fit)
-    covariance = pose_covariance(atlas, model, fit, defining, Side.LEFT, systematic)
-    axis = fit.rotation @ (defining[0] - defining[1])
+    covariance = pose_covariance(atlas, model, fit, defining, side, systematic)
+    if ears is not None:
+        combined = ears.combined_covariance(side, covariance)
+        return radius_95(combined), cone_95(combined, ears.fused(side).axis)
+    axis = mirror_right((defining[:1] - defining[1:2]) @ fit.rotation.T, side)[0]
     return radius_95(covariance), cone_95(covariance, axis / np.linalg.norm(axis))
 
 

@@ -230,13 +230,13 @@ class PoseModel:
         if estimate is None or "robust" not in estimate.poses:
             return ()
         if self._gains is None or self._gains[0] is not estimate:
-            touches = replace(estimate.touches, extra={})
-            settings = estimate.settings
+            settings, both = estimate.settings, self.ears if estimate.poses["robust"].of_both_ears else None
             found = gains(
-                touches,
+                replace(estimate.touches, extra={}),
                 estimate.atlas,
                 probe_noise=settings.probe_noise,
                 shared_error=settings.shared_error,
+                ears=None if both is None else both.comparison,
             )
             self._gains = (estimate, found)
         return self._gains[1]

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from atlas_cases import draw_side, draw_specimens, noisy, random_pose
 
-from gp_core import EXTERNAL, Atlas, LandmarkSet, Side, estimate_pose, fit_atlas
+from gp_core import EXTERNAL, PROBE, Atlas, LandmarkSet, Side, estimate_pose, fit_atlas
+from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import FeatureError, GeometryError
 from gp_core.frames import mirror_x
+from gp_core.pose.both_ears import compare_ears
 from gp_core.pose.next_touch import gains
 
 
@@ -37,6 +39,25 @@ def test_it_starts_from_the_pose_itself_and_names_every_other_feature(published:
         assert gain.cone_95_now == pytest.approx(pose.cone_95)
     worth = [gain.worth for gain in found]
     assert worth == sorted(worth, reverse=True)
+
+
+@pytest.mark.parametrize("side", Side)
+def test_with_the_axis_of_both_ears_it_starts_from_the_combined_pose(published: Atlas, side: Side) -> None:
+    head = draw_animal(published, rng=np.random.default_rng(8))
+    ears = {ear: LandmarkSet.from_touches(head.side(ear).as_mapping(PROBE), ear) for ear in Side}
+    own, other = ears[side], ears[side.other]
+    alone = estimate_pose(own, side)
+    both = compare_ears(own, alone, other, estimate_pose(other, side.other))
+    joined, found = both.fused(side), gains(own, published, ears=both)
+    assert joined.cone_95 < 0.99 * alone.cone_95
+    for gain, single in zip(
+        sorted(found, key=lambda gain: gain.code),
+        sorted(gains(own, published), key=lambda gain: gain.code),
+        strict=True,
+    ):
+        assert gain.radius_95_now == pytest.approx(joined.radius_95)
+        assert gain.cone_95_now == pytest.approx(joined.cone_95)
+        assert gain.cone_95 <= 1.001 * single.cone_95
 
 
 @pytest.mark.parametrize("n", [3, 4, 6, 8, 10])

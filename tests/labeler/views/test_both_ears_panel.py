@@ -87,7 +87,11 @@ def test_the_panel_says_how_the_ears_agree_and_makes_one_axis_of_both(
     assert not np.allclose(joined.axis, own[L].axis, atol=1e-6)
     assert "The axis is that of both." in notices(panel)
     assert workspace.pose.estimate is workspace.pose.estimate  # made once, however often it is asked for
-    assert workspace.pose.gains()
+    best = workspace.pose.gains()[0]
+    cone = f"{np.degrees(joined.cone_95):.1f}"
+    assert f"cone {cone}°" in panel.result.one.region.text()
+    assert f" {best.radius_95_now:.2f} →" in panel.result.next.text()
+    assert f" {cone} →" in panel.result.next.text()  # the same number in both places
     assert list(cut_words(panel)) == []
     assert read_pose(workspace.pose.export(tmp_path / "pose.json")).of_both_ears
     page = PoseReport(workspace.document.state, workspace.pose.estimate, ears=workspace.pose.ears).html()

@@ -403,6 +403,7 @@ def test_a_side_that_is_undecided_is_offered_with_its_odds(workspace, panel, qtb
     beside = panel.result.one.allowance.text()
     assert f"As named: {pose.plain_radius_95:.2f} mm" in beside
     assert "several hypotheses" in beside
+    assert f"as named, {pose.plain_radius_95:.2f} →" in panel.result.next.text()
     before = touches(workspace)
     qtbot.mouseClick(panel.result.other_side, CLICK)
     assert (workspace.pose.side, touches(workspace, Side.RIGHT)) == (Side.RIGHT, before)

@@ -88,7 +88,7 @@ class ResultCard(Card):
         wrong = pose is not None and (pose.side_state == "wrong" or bool(self._workspace.pose.misnamed))
         self._offer_readings(pose, wrong=wrong)
         self.notices.show_notices([] if estimate is None else [*_notices(self._workspace, estimate)])
-        self._show_gain(wanted=not wrong and model.swapped is None)
+        self._show_gain(pose, wanted=not wrong and model.swapped is None)
 
     def set_large(self, large: bool) -> None:
         """Show the estimate in large type, where there is room."""
@@ -109,11 +109,11 @@ class ResultCard(Card):
         sure = pose is None or pose.names_state != "undecided"
         self.swap.setText(names if sure else f"{names}  ({likely[1]})")
 
-    def _show_gain(self, *, wanted: bool) -> None:
+    def _show_gain(self, pose: CochleaPose | None, *, wanted: bool) -> None:
         gains = self._workspace.pose.gains() if wanted else ()
         self.next.setVisible(bool(gains))
         if gains:
-            self.next.setText(gain_text(gains[0]))
+            self.next.setText(gain_text(gains[0], as_named=pose is not None and pose.is_multimodal))
 
     def _aim(self) -> None:
         gains = self._workspace.pose.gains()

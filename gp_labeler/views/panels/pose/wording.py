@@ -155,15 +155,21 @@ def likely_text(probability: float) -> str:
     return f"{100 * probability:.0f} % likely" if probability >= 0.01 else "less than 1 % likely"
 
 
-def gain_text(gain: TouchGain) -> str:
-    """Return what a touch would gain, such as ``Touch IN next: 0.52 → 0.41 mm, 9.3 → 7.6°``."""
+def gain_text(gain: TouchGain, *, as_named: bool = False) -> str:
+    """Return what a touch would gain, such as ``Touch IN next: 0.52 → 0.41 mm, 9.3 → 7.6°``.
+
+    `as_named` where the region shown is a larger one, which covers several hypotheses.
+    """
     if gain.worth < _LITTLE_MM:
         return f"More touches gain little; {gain.code} gains most"
-    now, then = (math.degrees(angle) for angle in (gain.cone_95_now, gain.cone_95))
-    return (
-        f"Touch {gain.code} next:  {gain.radius_95_now:.2f} \N{RIGHTWARDS ARROW} {gain.radius_95:.2f} mm,  "
-        f"{now:.1f} \N{RIGHTWARDS ARROW} {then:.1f}°"
-    )
+    radius = _change(f"{gain.radius_95_now:.2f}", f"{gain.radius_95:.2f} mm")
+    now, then = (f"{math.degrees(angle):.1f}" for angle in (gain.cone_95_now, gain.cone_95))
+    before = "as named, " if as_named else ""
+    return f"Touch {gain.code} next:  {before}{radius},  {_change(now, then)}°"
+
+
+def _change(now: str, then: str) -> str:
+    return f"{now} \N{RIGHTWARDS ARROW} {then}"
 
 
 def change_text(name: str, touch: Touch, change: tuple[float, float] | None) -> str:

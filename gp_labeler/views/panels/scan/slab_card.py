@@ -39,8 +39,8 @@ class SlabCard(Card):
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
         self._unit = text_label("mm", "hint")
-        for widget in (self.thickness, self._unit):
-            keep_room(widget)
+        keep_room(self.thickness)
+        keep_room(self._unit)
         for column, widget in enumerate((text_label("Slab", "hint"), self.mode, self.thickness, self._unit)):
             grid.addWidget(widget, 0, column)
         grid.addWidget(text_label("Denoise", "hint"), 1, 0)
@@ -63,8 +63,8 @@ class SlabCard(Card):
             mode = "" if state.slab is None else state.slab.mode
             self.mode.setCurrentIndex(list(_MODES.values()).index(mode))
             self.denoise.setCurrentIndex(list(_KINDS.values()).index(state.denoise or ""))
-        for widget in (self.thickness, self._unit):
-            widget.setVisible(state.slab is not None)
+        self.thickness.setVisible(state.slab is not None)
+        self._unit.setVisible(state.slab is not None)
         self.thickness.set_value(None if state.slab is None else state.slab.mm)
 
     def _on_slab(self, _: object) -> None:
