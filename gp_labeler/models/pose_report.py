@@ -132,14 +132,14 @@ class PoseReport:
             return ""
         if self.ears.comparison is None:
             text = f"The two ears cannot be compared: {self.ears.problem}"
-            return f'<p style="color:{_BAD}">{escape(text)}</p>'
+            return f'<p style="color:{_BAD}">! {escape(text)}</p>'
         pose = self.estimate.poses.get("robust")
         joined = pose is not None and pose.of_both_ears
         check = self.ears.comparison.check
         text = "; ".join(self.ears.comparison.texts) + ("; the axis is that of both ears" if joined else "")
-        text += "" if check.agrees else f". {check.remedy} {_WITHHELD}"
-        colour = "" if check.agrees else f' style="color:{_BAD}"'
-        return f"<p{colour}>{escape(text[:1].upper() + text[1:])}</p>"
+        text += "." if check.agrees else f". {check.remedy} {_WITHHELD}"
+        words = escape(text[:1].upper() + text[1:]).replace(" deg", "&deg;")
+        return f"<p>{words}</p>" if check.agrees else f'<p style="color:{_BAD}">! {words}</p>'
 
     def _rows(self) -> Iterator[tuple[str, list[str]]]:
         estimate = self.estimate
@@ -150,7 +150,7 @@ class PoseReport:
         yield "95 % region", [_region(pose) for _, pose in poses]
         if any(pose.is_multimodal for _, pose in poses):
             yield "95 % region, as named", [_plain_region(pose) for _, pose in poses]
-        yield "Shared error in it", [_shared_error(pose) for _, pose in poses]
+        yield "Shared error, included", [_shared_error(pose) for _, pose in poses]
         yield "State", [pose.state for _, pose in poses]
         yield "Robot's y to the round window", [f"as {pose.round_window}" for _, pose in poses]
         yield "Atlas", [escape(pose.atlas) for _, pose in poses]
@@ -301,7 +301,12 @@ def _moved(mm: float, degrees: float) -> str:
 
 
 def _numbers(values: object, digits: int) -> str:
-    return "&nbsp;&nbsp;".join(f"{v:.{digits}f}" for v in np.asarray(values, dtype=np.float64).tolist())
+    return "&nbsp;&nbsp;".join(_number(v, digits) for v in np.asarray(values, dtype=np.float64).tolist())
+
+
+def _number(value: float, digits: int) -> str:
+    """Return a number with a true minus sign; a zero has none."""
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "&minus;")
 
 
 def _when(time: str) -> str:
@@ -311,7 +316,8 @@ def _when(time: str) -> str:
 
 
 def _spacing(spacing: tuple[float, float, float]) -> str:
-    return " x ".join(f"{v:.4g}" for v in spacing)
+    texts = [f"{v:.4g}" for v in spacing]
+    return texts[0] if len(set(texts)) == 1 else " \N{MULTIPLICATION SIGN} ".join(texts)
 
 
 def _source(n: int, png: bytes, embed: bool) -> str:

@@ -124,6 +124,7 @@ QTableView, QListView, QTreeView {
     selection-background-color: $accent; selection-color: $on_accent;
 }
 QTableView:focus, QListView:focus, QTreeView:focus { border-color: $focus; }
+QTableView::item { padding: 0 3px; }
 QHeaderView { background: transparent; }
 QHeaderView::section {
     background: transparent; color: $muted; border: none; border-bottom: 1px solid $border; padding: 4px 6px;

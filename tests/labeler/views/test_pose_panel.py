@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,6 +23,7 @@ from gp_labeler.document.touches import TouchHow
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.pose import ORDER
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.tracker import TrackerAddress
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.panels.pose.panel import PosePanel, holds_touches
 from gp_labeler.views.panels.pose.touch_table_model import CLEAR, NAME, USE, XYZ
@@ -636,3 +638,21 @@ def test_a_touch_shows_at_once(workspace, panel):
         QApplication.processEvents()
         took.append(time.process_time() - start)
     assert min(took) < 0.03
+
+
+def test_the_way_by_the_tracker_says_how_it_stands_also_where_its_card_is_out_of_sight(
+    workspace, panel, qtbot
+):
+    by_tracker = panel.touches.ways["tracker"]
+    offered = by_tracker.text()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    workspace.tracker.connect(TrackerAddress(port=port))  # where nobody listens any more
+
+    def is_lost() -> None:
+        workspace.tracker.poll()
+        assert by_tracker.text() == "No tracker"
+
+    qtbot.waitUntil(is_lost)
+    workspace.tracker.disconnect()
+    assert by_tracker.text() == offered

@@ -60,7 +60,7 @@ class MeasureDialog(QDialog):
         follow(self, workspace.measure.changed, self._show_hint)
         self.refresh()
         self._show_hint()
-        open_at(self, 760, 640)
+        open_at(self, 760, 700)
 
     def refresh(self, *_: object) -> None:
         """Show the distances of the chosen side as the landmarks stand."""

@@ -19,6 +19,7 @@ from gp_labeler.views.panels.parts import Card, ElidedLabel
 from gp_labeler.views.panels.pose.touch_table import TouchTable
 from gp_labeler.views.panels.pose.touch_table_model import TouchTableModel
 from gp_labeler.views.panels.pose.wording import change_text
+from gp_labeler.views.panels.tracker.card import tracker_state
 from gp_labeler.views.signals import blocked, follow
 from gp_labeler.views.stylesheet import set_role
 
@@ -152,12 +153,19 @@ class TouchesCard(Card):
         follow(self, self._workspace.scan.opened, self._show_tool)
         follow(self, self._workspace.document.reset, self._show_tool)
         self._show_tool()
+        for signal in (self._workspace.tracker.changed, self._workspace.tracker.moved):
+            follow(self, signal, self._show_tracker)
 
     def _show_tool(self, *_: object) -> None:
         button = self.ways["scan"]
         button.setEnabled(self._workspace.scan.volume is not None)
         with blocked(button):
             button.setChecked(self._workspace.interaction.tool == "touch")
+
+    def _show_tracker(self) -> None:
+        state = tracker_state(self._workspace) or _WAYS["tracker"][0]
+        if state != self.ways["tracker"].text():
+            self.ways["tracker"].setText(state)
 
     def _toggle_skull(self) -> None:
         self.model.show_skull(not self.model.skull_shown)

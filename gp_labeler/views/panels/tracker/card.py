@@ -9,10 +9,11 @@ from gp_labeler.tracker import LinkPhase
 from gp_labeler.views.formatting import sentence
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.panels.pose.wording import triple
 from gp_labeler.views.signals import attempt, blocked, follow
 from gp_labeler.views.stylesheet import set_role
 
-__all__ = ["TrackerCard", "tracker_role", "tracker_words"]
+__all__ = ["TrackerCard", "tracker_role", "tracker_state", "tracker_words"]
 
 
 def tracker_role(workspace: Workspace) -> str:
@@ -28,6 +29,16 @@ def tracker_words(workspace: Workspace) -> str:
     tracker = workspace.tracker
     trouble = tracker.trouble if tracker.phase is LinkPhase.CONNECTED and not tracker.visible else ""
     return sentence(trouble) if trouble else tracker.words
+
+
+def tracker_state(workspace: Workspace) -> str:
+    """Say in two words how the tracker stands; empty where none is asked for."""
+    tracker = workspace.tracker
+    if tracker.phase in (LinkPhase.LOST, LinkPhase.SILENT):
+        return "No tracker"
+    if tracker.phase is LinkPhase.CONNECTED:
+        return "Tracker on" if tracker.visible else "No probe"
+    return ""
 
 
 class TrackerCard(Card):
@@ -91,6 +102,6 @@ class TrackerCard(Card):
         self.words.setText(tracker_words(self._workspace))
         set_role(self.words, tracker_role(self._workspace))
         tip = tracker.tip
-        self.tip.setText("" if tip is None else "  ".join(f"{v:8.2f}" for v in tip) + " mm")
+        self.tip.setText("" if tip is None else f"{triple(tip)} mm")
         self.tip.setEnabled(tracker.visible)
         self.progress.setValue(round(100 * tracker.progress))
