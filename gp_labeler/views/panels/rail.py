@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from qtpy.QtCore import QEvent, QRectF, QSize, Qt, Signal
-from qtpy.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
+from qtpy.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen, QResizeEvent
 from qtpy.QtWidgets import QAbstractButton, QButtonGroup, QSizePolicy, QVBoxLayout, QWidget
 
 from gp_core.landmarks.features import Side
@@ -78,7 +78,7 @@ class Rail(QWidget):
         self.keys_button = _RailButton("keys", "Keys", "?", "info", self)
         self.keys_button.setToolTip("All keyboard shortcuts (?)")
         do_action(self.keys_button, actions["help.shortcuts"])
-        layout = QVBoxLayout(self)
+        self._column = layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 8, 0, 8)
         layout.setSpacing(4)
         self._steps = in_column(*self.buttons.values(), spacing=4)
@@ -131,6 +131,18 @@ class Rail(QWidget):
     def _fit_width(self) -> None:
         """Be as wide as the longest name."""
         self.setFixedWidth(max(button.sizeHint().width() for button in self.buttons.values()))
+        self._share_height()
+
+    def _share_height(self) -> None:
+        """Show the icons of all steps, or of none where the window is too low."""
+        buttons, margins = [*self.buttons.values(), self.keys_button], self._column.contentsMargins()
+        needed = sum(button.whole_height + self._column.spacing() for button in buttons)
+        for button in buttons:
+            button.set_bare(self.height() < needed + margins.top() + margins.bottom())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().resizeEvent(event)
+        self._share_height()
 
     def _refresh(self, *_: object) -> None:
         document, labels = self._workspace.document, self._workspace.labels
@@ -149,7 +161,7 @@ class _RailButton(QAbstractButton):
         self.setObjectName(f"rail-{id}")
         self.setText(title)
         self.setAccessibleName(title)
-        self._number, self._icon, self._done = number, icon, False
+        self._number, self._icon, self._done, self._is_bare = number, icon, False, False
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Maximum)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -162,15 +174,27 @@ class _RailButton(QAbstractButton):
             self.setAccessibleDescription(self.toolTip() + (" · done" if done else ""))
             self.update()
 
+    def set_bare(self, bare: bool) -> None:
+        """Leave out the icon, or show it."""
+        if bare != self._is_bare:
+            self._is_bare = bare
+            self.updateGeometry()
+            self.update()
+
+    @property
+    def whole_height(self) -> int:
+        """The height with its icon, logical pixels."""
+        return self._icon_height + line_height(self) + 10
+
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         words = text_width(self, *(f"{n} {step.title}" for n, step in enumerate(STEPS, 1)), bold=True)
         own = text_width(self, f"{self._number} {self.text()}", bold=True) + pixels(self, 8)
         added = min(own, pixels(self, _LONGEST))
         width = max(max(words, added) + 2 * _PAD, pixels(self, 72))
-        return QSize(width, self._icon_height + line_height(self) + 10)
+        return QSize(width, line_height(self) + 8 if self._is_bare else self.whole_height)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the words alone: in a low window the icons go."""
+        """Return the room for the words alone."""
         return QSize(self.sizeHint().width(), line_height(self) + 8)
 
     @property
@@ -203,7 +227,7 @@ class _RailButton(QAbstractButton):
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(box.adjusted(0.5, 0.5, -0.5, -0.5), 8, 8)
         colour = theme.text if self.isChecked() else theme.muted if self.isEnabled() else theme.faint
-        has_icon = self.height() >= self.sizeHint().height()
+        has_icon = not self._is_bare
         if has_icon:
             side = pixels(self, 22)
             painter.setOpacity(1.0 if self.isEnabled() else _DISABLED)

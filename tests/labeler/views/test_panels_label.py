@@ -58,6 +58,24 @@ def panel(workspace: Workspace, qtbot, asked) -> LabelPanel:
     return panel
 
 
+@pytest.mark.parametrize("short", [0, 1, 2, 60])
+def test_the_rail_has_all_its_icons_or_none(workspace, qtbot, short) -> None:
+    """In a window that is a pixel too low, heights are shared unevenly."""
+    rail = Rail(workspace, actions_of(workspace, qtbot))
+    apply_theme(rail, DARK)
+    qtbot.addWidget(rail)
+    rail.show()
+    rail.resize(rail.width(), 1000)
+    QApplication.processEvents()
+    room = 1000 - (rail.keys_button.y() - rail.buttons["pose"].geometry().bottom() - 1) + 4
+    rail.resize(rail.width(), room - short)
+    for _ in range(3):
+        QApplication.processEvents()
+    buttons = [*rail.buttons.values(), rail.keys_button]
+    assert len({button.height() for button in buttons}) == 1
+    assert all(button.height() >= button.sizeHint().height() for button in buttons)
+
+
 def test_the_next_action_stays_where_it_is_from_state_to_state(workspace, panel) -> None:
     """So that one button can be clicked again and again."""
     place(workspace, "CA", "CB", "RWP")

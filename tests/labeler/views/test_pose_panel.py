@@ -640,7 +640,7 @@ def test_a_touch_shows_at_once(workspace, panel):
     assert min(took) < 0.03
 
 
-def test_the_way_by_the_tracker_says_how_it_stands_also_where_its_card_is_out_of_sight(
+def test_the_way_by_the_tracker_says_how_it_stands_also_where_its_card_is_below_the_window(
     workspace, panel, qtbot
 ):
     by_tracker = panel.touches.ways["tracker"]

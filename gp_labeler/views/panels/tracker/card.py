@@ -32,7 +32,7 @@ def tracker_words(workspace: Workspace) -> str:
 
 
 def tracker_state(workspace: Workspace) -> str:
-    """Say in two words how the tracker stands; empty where none is asked for."""
+    """Return in two words how the tracker stands; empty where none is asked for."""
     tracker = workspace.tracker
     if tracker.phase in (LinkPhase.LOST, LinkPhase.SILENT):
         return "No tracker"
