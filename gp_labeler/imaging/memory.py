@@ -7,11 +7,21 @@ import os
 import sys
 from pathlib import Path
 
-__all__ = ["available_memory", "return_freed_memory"]
+__all__ = ["available_memory", "group_memory", "return_freed_memory"]
+
+_GROUP_FILES = {
+    1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_"),
+    2: ("memory.max", "memory.current", ""),
+}
+"""Of a control group by its version: its limit, what it has taken, and how names begin in its statistics."""
 
 
 def available_memory() -> float:
-    """Return the bytes of memory that programs can have; infinity where the system does not say."""
+    """Return the bytes of memory that this process can have; infinity where the system does not say."""
+    return min(_of_the_machine(), group_memory())
+
+
+def _of_the_machine() -> float:
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
         return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable"))
@@ -21,6 +31,51 @@ def available_memory() -> float:
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (AttributeError, ValueError, OSError):
         return float("inf")
+
+
+def group_memory(root: Path = Path("/")) -> float:
+    """Return the bytes that the control groups of this process leave to it: on a cluster, in a container.
+
+    Parameters
+    ----------
+    root : Path
+        Of the file system.
+
+    Returns
+    -------
+    float
+        Infinity where no group has a limit. Pages of files count as free, for the system takes them back.
+
+    References
+    ----------
+    https://docs.kernel.org/admin-guide/cgroup-v2.html, https://docs.kernel.org/admin-guide/cgroup-v1/memory.html
+    """
+    try:
+        lines = (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return float("inf")
+    free = [float("inf")]
+    for _, controllers, path in (line.split(":", 2) for line in lines if line.count(":") >= 2):
+        if controllers and "memory" not in controllers.split(","):
+            continue
+        top = root / "sys/fs/cgroup" / ("memory" if controllers else "")
+        group = top / path.strip("/")
+        free += [_left_in(each) for each in (group, *group.parents) if each.is_relative_to(top)]
+    return min(free)
+
+
+def _left_in(group: Path) -> float:
+    """Return what a control group, of version 2 or 1, leaves; infinity where it has no limit."""
+    version = 2 if (group / "memory.max").exists() else 1
+    limit, used, prefix = _GROUP_FILES[version]
+    try:
+        most, taken = (int((group / name).read_text(encoding="ascii")) for name in (limit, used))
+        stat = (group / "memory.stat").read_text(encoding="ascii").splitlines()
+    except (OSError, ValueError):  # "max" is no number
+        return float("inf")
+    numbers = {name: int(number) for name, _, number in (line.partition(" ") for line in stat)}
+    files = numbers.get(f"{prefix}inactive_file", 0) + numbers.get(f"{prefix}active_file", 0)
+    return float(max(0, most - taken + files))
 
 
 def return_freed_memory() -> None:
