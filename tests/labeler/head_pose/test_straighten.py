@@ -168,7 +168,8 @@ def test_of_two_heads_none_is_chosen_until_somebody_says_which_one_is_meant():
 
 def test_a_large_thing_beside_the_head_is_spoken_of():
     volume = head(names=USUAL).volume
-    z, y, x = np.indices(volume.array.shape) - np.array(volume.array.shape)[:, None, None, None] / 2
+    middle = np.array(volume.array.shape) / 2 + (0.3, 0.7, 0.45)  # no plane of the voxels is one of the ball
+    z, y, x = np.indices(volume.array.shape) - middle[:, None, None, None]
     ball = np.where(abs(np.sqrt(x**2 + y**2 + z**2) - 24) < 3, 30_000, 2_500).astype(np.uint16)
     pose = straighten(Volume(np.concatenate([volume.array, ball], axis=2), volume.T_scan_voxel))
     assert pose.mid_plane.angle_to_deg(true_plane(head(names=USUAL))) < 0.6
