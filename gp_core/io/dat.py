@@ -48,20 +48,22 @@ def skull_feature_names() -> tuple[str, ...]:
     return tuple(_SKULL)
 
 
-def is_sentinel(position: FloatArray) -> bool:
+def is_sentinel(position: FloatArray, *, zero: bool = True) -> bool:
     """Return whether coordinates mark a point that the tracker did not see.
 
     Parameters
     ----------
     position : (3,) array
         As read, mm.
+    zero : bool
+        Whether 0 0 0 is such a mark; in a scan it may be a position.
 
     Returns
     -------
     bool
         True for the trackers' marks of a missing point.
     """
-    return bool((position == _SENTINELS_MM).all(axis=1).any())
+    return bool((position == (_SENTINELS_MM if zero else _SENTINELS_MM[:2])).all(axis=1).any())
 
 
 def read_dat(path: str | PathLike[str]) -> PointList:

@@ -190,7 +190,7 @@ def read_landmarks(
     -------
     LandmarkSet
         In the frame that the file names, else ``scan`` (``.dat``: ``tracker``). What the file marks as
-        suggested is in `LandmarkSet.suggested`.
+        suggested is in `LandmarkSet.suggested`; what is at -1000 -1000 -1000 was not seen.
 
     Raises
     ------
@@ -234,7 +234,14 @@ def landmarks_of(
         As for `read_landmarks`.
     """
     chosen = _side_of(points, side)
-    return _landmark_set(_one_side(points, chosen), chosen, points.frame, unknown)
+    points = _one_side(points, chosen)
+    marked = [
+        p.label for p in points.points if p.position is not None and is_sentinel(p.position, zero=False)
+    ]
+    if marked:
+        _log.warning("%s: at -1000, -1000, -1000, so not seen: %s", points.source, " ".join(marked))
+        points = replace(points, points=tuple(_without_sentinel(p, zero=False) for p in points.points))
+    return _landmark_set(points, chosen, points.frame, unknown)
 
 
 def sides_of(points: PointList, *, unknown: Unknown = "error") -> tuple[LandmarkSet, ...]:
@@ -329,8 +336,8 @@ def specimen_of(points: PointList) -> str:
     return name or specimen_named(points.source, _suffix(points.source))
 
 
-def _without_sentinel(point: LabelledPoint) -> LabelledPoint:
-    if point.position is None or not is_sentinel(point.position):
+def _without_sentinel(point: LabelledPoint, *, zero: bool = True) -> LabelledPoint:
+    if point.position is None or not is_sentinel(point.position, zero=zero):
         return point
     return point._replace(position=None, status=Status.UNSEEN)
 

@@ -73,6 +73,21 @@ def test_what_is_no_file_to_read(tmp_path, reader):
             reader(tmp_path / name)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "name,x,y,z\nCA,1,2,3\nCB,-1000,-1e3,-1000\nCL,0,0,0\n",
+        "label,r,a,s\nCA,-1,-2,3\nCB,-1000,-1000,-1000\nCL,0,0,0\n",
+    ],
+)
+def test_the_mark_of_what_was_not_seen_is_no_position(text, tmp_path, caplog):
+    (tmp_path / "GP01_L.csv").write_text(text)
+    landmarks = read_landmarks(tmp_path / "GP01_L.csv")
+    assert landmarks.placed == ("CA", "CL")  # 0 0 0 may be a position of a scan
+    assert "CB" in landmarks.unseen
+    assert "at -1000, -1000, -1000, so not seen: CB" in caplog.text
+
+
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="the superuser may read everything")
 def test_a_file_without_permission(tmp_path):
     file = write_json(tmp_path / "GP01_L.mrk.json", markup(control_point("CA")))
