@@ -73,6 +73,8 @@ class FirstLabelsModel:
         self._atlas = atlas
         self._jobs, self._messages = jobs, messages
         self._folder = templates_folder(directory)
+        self.labelled: tuple[Path, ...] = ()
+        """Labelled scans that suggestions were made from last, of whatever specimen."""
         self.proposal: Proposal | None = None
         """What was suggested last for the specimen that is open."""
         document.reset.connect(self._on_reset)
@@ -127,14 +129,15 @@ class FirstLabelsModel:
             threshold=self._document.state.threshold,
             atlas=self._atlas.expected_by,
         )
-        self._jobs.submit(job, partial(self._take, left_confirmed), key=_KEY)
+        self._jobs.submit(job, partial(self._take, job.labelled, left_confirmed), key=_KEY)
 
     def cancel(self) -> None:
         """Stop; nothing is suggested."""
         self._jobs.cancel(_KEY)
         self.changed.emit()
 
-    def _take(self, left_confirmed: bool, found: FirstLabels) -> None:
+    def _take(self, labelled: tuple[Path, ...], left_confirmed: bool, found: FirstLabels) -> None:
+        self.labelled = labelled
         if found.head is not None and self._head.frame is None:
             self._head.take(found.head, left_confirmed=left_confirmed)
         self.proposal = proposal = found.proposal

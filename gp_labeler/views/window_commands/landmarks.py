@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["AS_THE_FILE", "FOLDER", "LANDMARK_COMMANDS"]
 
+AS_BEFORE = "The same as for the head before"
 LISTED, FOLDER, FILES = "From the list of specimens", "From a folder…", "From files…"
 AS_THE_FILE, MIRRORED = "Left is correct", "The scan is mirrored…"
 _LABELLED = "Labelled scans (*.gpspecimen.json *.mrk.json *.fcsv);;All files (*)"
@@ -77,7 +78,8 @@ def _ask_labelled(workspace: Workspace, prompts: Prompts) -> list[Path]:
     listed = [
         row.path for row in workspace.specimens.every if sum(row.placed.values()) and row.path != open_now
     ]
-    answers = [LISTED, FOLDER, FILES] if listed else [FOLDER, FILES]
+    before = list(workspace.first_labels.labelled)
+    answers = [AS_BEFORE] * bool(before) + [LISTED] * bool(listed) + [FOLDER, FILES]
     answer = prompts.choose(
         "Suggest from my scans",
         "Which labelled scans should the suggestions be based on?",
@@ -90,7 +92,7 @@ def _ask_labelled(workspace: Workspace, prompts: Prompts) -> list[Path]:
         return [] if folder is None else [folder]
     if answer == FILES:
         return prompts.open_files("Labelled scans", _LABELLED, many=True)
-    return listed if answer == LISTED else []
+    return {AS_BEFORE: before, LISTED: listed}.get(answer, [])
 
 
 def _knows_left(workspace: Workspace, prompts: Prompts) -> bool:

@@ -96,6 +96,7 @@ def test_the_atlas_in_use_is_asked_and_what_it_contradicts_is_looked_at_first(
     made.first_labels.suggest([labelled])
     calls.deliver_until_idle(made.jobs)
     assert asked == [atlas]
+    assert made.first_labels.labelled == (labelled,)  # offered again for the next head
     assert made.document.landmarks(Side.LEFT).suggested["OI"].atlas_distance == 1.4
     assert made.labels.active == Active(Side.LEFT, "OI")
     assert any("look closely at OI left" in text for text in said)

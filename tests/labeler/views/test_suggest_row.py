@@ -8,6 +8,7 @@ from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
 from gp_labeler.head_pose import HeadPose
 from gp_labeler.views.panels.label.suggest_row import SuggestRow
+from gp_labeler.views.window_commands.landmarks import ask_suggest_like
 
 
 def labelled_head(folder):
@@ -44,3 +45,14 @@ def test_a_new_scan_gets_suggestions_from_a_folder(qtbot, make_window, tmp_path,
     active = window.workspace.labels.active
     where = window.workspace.labels.place_of(active.side, active.code)
     assert window.grid.can_judge(where)  # the least certain is shown closely
+
+
+def test_the_next_head_is_offered_the_labelled_scans_of_the_one_before(make_window, tmp_path, monkeypatch):
+    window, given = make_window(), []
+    model = window.workspace.first_labels
+    monkeypatch.setattr(model, "suggest", lambda labelled, **_: given.append(labelled))
+    answers, same = Answers(), "The same as for the head before"
+    for model.labelled, wanted in (((), []), ((tmp_path,), [[tmp_path]])):
+        answers.answers = [same, "Left is correct"]
+        ask_suggest_like(window.workspace, answers)
+        assert given == wanted
