@@ -51,25 +51,37 @@ class EstimateSettingsCard(Card):
         self.specimen.setToolTip("Its name in reports and exports")
         self.side = Segments({side.value: side.word.capitalize() for side in Side}, hints)
         self.method = Segments({**METHOD_NAMES, "both": "Both"}, _HINTS)
-        self.noise = NumberField(_NOISE, widest="automatic")
-        self.noise.step = 0.05
+        self.noise = _number(
+            _NOISE,
+            0.05,
+            "automatic",
+            "Error of an ordinary touch, mm for each coordinate; if empty, estimated from the touches",
+        )
         self.noise.setPlaceholderText("automatic")
-        self.noise.setToolTip(
-            "Error of an ordinary touch, mm for each coordinate; if empty, estimated from the touches"
-        )
         self.found = text_label("", "hint")
-        self.shared = NumberField(f"{_SHARED}, mm", widest="0.25")
-        self.shared.step = 0.05
-        self.shared.setToolTip(
+        self.shared = _number(
+            f"{_SHARED}, mm",
+            0.05,
+            "0.25",
             "RMS length of one offset that all touches of the session share: of the tip, the reference "
-            "marker, soft tissue. The touches do not show it. It widens the 95 % region and moves nothing"
+            "marker, soft tissue. The touches do not show it. It widens the 95 % region and moves nothing",
         )
-        self.each = NumberField(_EACH, widest="9")
-        self.each.step = 1
-        self.each.setToolTip(
+        self.each = _number(
+            _EACH,
+            1,
+            "9",
             "How often each feature is asked for. All touches are used, by their mean; three times take some "
-            "30 % off the error of CO where touches are rough"
+            "30 % off the error of CO where touches are rough",
         )
+        self._make_ears()
+        self.atlas = ElidedLabel()
+        self.problem = text_label("", "warning", wrap=True)
+        self.problem.setAccessibleName("Why the atlas chosen last time is not in use")
+        self.to_atlas = link("Change", "Choose or fit another atlas (step 3)")
+        self._lay_out()
+        self._connect(actions)
+
+    def _make_ears(self) -> None:
         self.ears = QCheckBox("Combine the axes of both ears")
         self.ears.setToolTip(
             "If both ears were touched in one frame and agree, the axis is estimated from both. CO is not "
@@ -82,11 +94,8 @@ class EstimateSettingsCard(Card):
             "Touched skull features that lie in the mid-plane of the head, such as S1, S4. They help to "
             "determine the plane in which the two ears are compared"
         )
-        self.atlas = ElidedLabel()
-        self.problem = text_label("", "warning", wrap=True)
-        self.problem.setAccessibleName("Why the atlas chosen last time is not in use")
-        self.to_atlas = link("Change", "Choose or fit another atlas (step 3)")
-        self._lay_out()
+
+    def _connect(self, actions: Actions) -> None:
         self.side.chosen.connect(lambda side: self._choose(side=Side.parse(side)))
         self.method.chosen.connect(lambda name: self._choose(methods=_METHODS[name]))
         self.noise.value_chosen.connect(lambda mm: self._choose(probe_noise=mm))
@@ -95,12 +104,17 @@ class EstimateSettingsCard(Card):
         self.each.value_chosen.connect(lambda n: self._choose(touches_each=round(n)))
         self.ears.clicked.connect(lambda on: self._choose(both_ears=on))
         self.midline.editingFinished.connect(self._choose_midline)
-        do_action(self.to_atlas, actions["atlas.show"])
         self.specimen.editingFinished.connect(self._rename)
+        do_action(self.to_atlas, actions["atlas.show"])
         do_action(self.new, actions["file.new"])
-        for signal in (workspace.document.details_changed, workspace.document.reset, workspace.scan.opened):
-            follow(self, signal, self.refresh)
-        for signal in (workspace.atlas.changed, workspace.atlas.details_changed):
+        document, atlas = self._workspace.document, self._workspace.atlas
+        for signal in (
+            document.details_changed,
+            document.reset,
+            self._workspace.scan.opened,
+            atlas.changed,
+            atlas.details_changed,
+        ):
             follow(self, signal, self.refresh)
 
     def refresh(self, *_: object) -> None:
@@ -181,6 +195,13 @@ def _together(*fields: QLayout) -> FlowLayout:
         holder.setLayout(field)
         row.addWidget(holder)
     return row
+
+
+def _number(name: str, step: float, widest: str, hint: str) -> NumberField:
+    field = NumberField(name, widest=widest)
+    field.step = step
+    field.setToolTip(hint)
+    return field
 
 
 def _caption(name: str) -> QLabel:
