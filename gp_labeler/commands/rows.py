@@ -344,10 +344,10 @@ def landmark_rows() -> Iterator[Action]:
             checked: Test | None = None, group: str = "place", hint: str = "", icon: str = "") -> Action:
         return Action(id, "Landmarks", title, keys, run, enabled, checked, hint, group, icon)
 
-    yield row("point.accept_ghost", "Accept the ghost, confirm a suggestion", ("Return", "Enter"),
+    yield row("point.accept_ghost", "Accept the ghost, confirm a suggestion", ("Enter", "Return"),
               _accept_or_confirm, _can_confirm, icon="check",
               hint="An accepted ghost becomes a suggestion. It counts when you confirm it in a close view")
-    yield row("point.confirm", "Confirm the suggestion or ghost", ("Ctrl+Return", "Ctrl+Enter"), _confirm,
+    yield row("point.confirm", "Confirm the suggestion or ghost", ("Ctrl+Enter", "Ctrl+Return"), _confirm,
               _can_confirm, hint="Zooms in first if the point cannot be judged in the current view")
     yield row("point.accept_all", "Accept all ghosts of this side", (),
               lambda w: w.labels.accept_all_ghosts(),

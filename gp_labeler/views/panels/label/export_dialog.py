@@ -76,7 +76,7 @@ class ExportDialog(QDialog):
         self._lay_out()
         follow(self, workspace.labels.problems_changed, self.refresh)
         self.refresh()
-        open_at(self, 560, 520)
+        open_at(self, 560, 660)
 
     def refresh(self, *_: object) -> None:
         """Say what would be written, and what would be missing."""

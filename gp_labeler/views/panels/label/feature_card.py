@@ -315,10 +315,7 @@ _COMMANDS: Mapping[str, str] = {
 def _with_key(text: str, command: str) -> str:
     """Return the words of a button with the first key of its command."""
     keys = ACTIONS[command].shortcuts if command in ACTIONS else ()
-    return f"{text}   {_SYMBOLS.get(keys[0], keys_text(keys[0]))}" if keys else text
-
-
-_SYMBOLS = {"Return": "Enter"}
+    return f"{text}   {keys_text(keys[0])}" if keys else text
 
 
 def _label(role: str, *, wrap: bool = False) -> QLabel:
