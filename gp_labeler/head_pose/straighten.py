@@ -156,12 +156,12 @@ def _mid_plane(
     """Return the first plane that can be trusted, over thresholds and islands of bone."""
     tried: list[_Found] = []
     for islands in _islands_at(_levels(coarse) if threshold is None else (threshold,), fine, coarse):
-        heads, n_apart = _separate_heads(islands, report)
+        heads, apart = _separate_heads(islands, report)
         if len(heads) > 1 and meant is None:
             raise SeveralHeadsError([head.bone.centre for head in heads], file=volume.path)
         if heads:
-            found = _meant_head(heads, meant, islands, report)
-            return replace(found, lies_beside=n_apart > len(heads))
+            found = _meant_head(heads, apart, meant, islands, report)
+            return replace(found, lies_beside=len(apart) > len(heads))
         for bone in islands.searched:
             found = _best_plane(bone, islands, report)
             tried.append(found)
@@ -214,20 +214,26 @@ def _islands_at(levels: Sequence[float], fine: CoarseScan, coarse: CoarseScan) -
     return found[::-1] if thickness[0] > _MUCH_THICKER * thickness[-1] else found
 
 
-def _separate_heads(islands: _Islands, report: Report) -> tuple[list[_Found], int]:
-    """Return the mid-plane of each head beside another large part of bone, and how many such parts are."""
+def _separate_heads(islands: _Islands, report: Report) -> tuple[list[_Found], list[Bone]]:
+    """Return the mid-plane of each head beside another large part of bone, and all such parts."""
     rivals = islands.searched[1:]
     apart = [b for b in rivals if any(b.is_apart_from(other) for other in rivals if other is not b)]
     found = [_best_plane(bone, islands, report) for bone in apart]
-    return [head for head in found if head.accepted], len(apart)
+    return [head for head in found if head.accepted], apart
 
 
-def _meant_head(heads: list[_Found], meant: FloatArray | None, islands: _Islands, report: Report) -> _Found:
+def _meant_head(
+    heads: list[_Found],
+    apart: list[Bone],
+    meant: FloatArray | None,
+    islands: _Islands,
+    report: Report,
+) -> _Found:
     """Return the only head, or the one that a point lies nearest to, with its jaw and what else is near."""
     own = heads[0]
     if meant is not None:
         own = min(heads, key=lambda head: float(np.linalg.norm(head.bone.centre - meant)))
-    others = [head.bone for head in heads if head is not own]
+    others = [bone for bone in apart if bone is not own.bone]
     found = _best_plane(own.bone.with_what_is_near(islands.searched[0], others), islands, report)
     return found if found.accepted else own
 
