@@ -271,7 +271,7 @@ def test_exchanged_sides_are_noticed():
         side: LandmarkSet(clicked[Side.RIGHT if side is Side.LEFT else Side.LEFT].points, side)
         for side in Side
     }
-    assert "left and right exchanged" in straighten_by_landmarks(phantom.volume, exchanged).warnings[0]
+    assert "left and right are exchanged" in straighten_by_landmarks(phantom.volume, exchanged).warnings[0]
 
 
 @pytest.mark.parametrize(("codes", "sides"), [(["OI", "MN", "OS", "IN"], "L"), (["OI"], "LR"), ([], "LR")])
