@@ -273,7 +273,8 @@ def study_killed(folder: Path, rng: np.random.Generator) -> int:
             animals / f"{name}_L.mrk.json", draw_animal(Atlas.published(), rng=rng).side("L"), specimen=name
         )
     checkpoint = folder / "search.json"
-    words = [sys.executable, "-m", "gp_core.cli", "search", str(animals), "--workers", "2", "--checkpoint"]
+    gp_core = [sys.executable, "-c", "import sys; from gp_labeler.cli.start import core; sys.exit(core())"]
+    words = [*gp_core, "search", str(animals), "--workers", "2", "--checkpoint"]
     words += [str(checkpoint), "--max-iterations", "2", "--fewest-training", "8"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
     time.sleep(float(rng.uniform(0.5, 8.0)))
