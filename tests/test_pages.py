@@ -13,6 +13,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -115,6 +116,14 @@ def _parse(program: str, words: list[str]) -> None:
 def _blocks() -> list[tuple[str, int, str]]:
     pages = [(page.stem, page.read_text(encoding="utf-8")) for page in _PAGES if page.parent.name != "howto"]
     return [(name, n, block) for name, text in pages for n, block in enumerate(_BLOCK.findall(text))]
+
+
+@pytest.fixture(autouse=True)
+def _closed() -> Iterator[None]:
+    """Let pyvista, which keeps every plotter, forget those that a page leaves open."""
+    yield
+    if "pyvista" in sys.modules:
+        sys.modules["pyvista"].close_all()
 
 
 @pytest.fixture(scope="module")
