@@ -148,10 +148,11 @@ def start_messages(prog: str, words: Sequence[str], verbose: bool | None, log_fi
     """
     command = prog.split()[0]
     of_a_caller = list(logging.getLogger().handlers)
-    logging.basicConfig(format=f"{command}: %(message)s", level=logging.WARNING)
+    logging.basicConfig(level=logging.WARNING)
     for handler in logging.getLogger().handlers:
         if handler not in of_a_caller:
             handler.addFilter(_is_ours)
+            handler.setFormatter(_OneLine(f"{command}: %(message)s"))
         if type(handler) is logging.StreamHandler:  # the terminal's, not what a caller has set up
             handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
     ours = [logging.getLogger(package) for package in _PACKAGES]
@@ -173,6 +174,14 @@ def start_messages(prog: str, words: Sequence[str], verbose: bool | None, log_fi
             prog,
             " ".join(words),
         )
+
+
+class _OneLine(logging.Formatter):
+    """One line a message, also if the name of a file has a line break."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - overrides logging's
+        """Show line breaks as they are written in Python."""
+        return super().formatMessage(record).replace("\n", "\\n")
 
 
 def _is_ours(record: logging.LogRecord) -> bool:

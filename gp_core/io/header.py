@@ -134,7 +134,9 @@ class FileHeader:
             or (isinstance(self.specimen, str) and bool(self.specimen.strip())),
             "frame": self.frame in FRAMES,
             "observer": self.observer is None or isinstance(self.observer, str),
-            "round": isinstance(self.round, int) and not isinstance(self.round, bool) and self.round > 0,
+            "round": isinstance(self.round, int)
+            and not isinstance(self.round, bool)
+            and 0 < self.round < 10_000,  # as in the name of a file
             "volume": self.volume is None or isinstance(self.volume, dict),
             "provenance": isinstance(self.provenance, dict),
             "extra": all(isinstance(label, str) for label in self.extra),

@@ -32,11 +32,11 @@ def test_what_libraries_say_is_not_for_the_terminal(tmp_path: Path) -> None:
         from gp_core.command_line import start_messages
         start_messages("gp-core check", [], None, None)
         logging.getLogger("tifffile").error("invalid page offset")
-        logging.getLogger("gp_core.io").warning("taken as LPS")
+        logging.getLogger("gp_core.io").warning("%s: taken as LPS", chr(10) + "A.csv")
     """
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert done.stderr == "gp-core: taken as LPS\n"
+    assert done.stderr == "gp-core: \\nA.csv: taken as LPS\n"
 
 
 def test_a_log_holds_everything_and_grows(tmp_path: Path) -> None:

@@ -210,6 +210,7 @@ def test_doubled_labels_are_refused(file):
         ({"volume": "scan.nrrd"}, "wrong volume"),
         ({"provenance": [1]}, "wrong provenance"),
         ({"extra": [1]}, "wrong extra"),
+        ({"round": 10**70}, "wrong round"),
         ({"schemaVersion": 2}, "Update gp-labeler"),
     ],
 )
