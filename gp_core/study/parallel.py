@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
     BrokenExecutor,
     CancelledError,
     Executor,
     Future,
+    InvalidStateError,
     ProcessPoolExecutor,
-    as_completed,
 )
 from contextlib import contextmanager
 from importlib import import_module
+from queue import SimpleQueue
 from typing import Any, TypeVar
 
 from gp_core.errors import GpError
@@ -60,12 +62,21 @@ def run_map(
     """
     if executor is None:
         return [_told(i, function(item), done) for i, item in enumerate(items)]
+    from gp_core.study.worker_processes import interrupts_held  # here: most commands need no processes
+
     futures: dict[Future[Result], int] = {}
+    finished: SimpleQueue[Future[Result]] = SimpleQueue()
     found: dict[int, Result] = {}
     try:
-        for i, item in enumerate(items):  # one by one: Ctrl-C finds those that are submitted
-            futures[executor.submit(function, item)] = i
-        for future in as_completed(futures):
+        # Ctrl-C must not leave locks of the executor or of a future that is not done held: its thread would
+        # wait for them for ever. `as_completed` takes the locks of all futures.
+        with interrupts_held():
+            for i, item in enumerate(items):
+                future = executor.submit(function, item)
+                futures[future] = i
+                future.add_done_callback(finished.put)
+        for _ in items:
+            future = finished.get()
             found[futures[future]] = _told(futures[future], future.result(), done)
     except BrokenExecutor:
         raise GpError(
@@ -136,9 +147,29 @@ def open_executor(workers: int | None = None, scheduler: str | None = None) -> I
                         executor.submit(int)
                 yield executor
             except BaseException:
-                context.end_workers()  # else leaving waits for what runs, and for all that was submitted
-                executor.shutdown(cancel_futures=True)
+                with _cancelled_is_no_error():
+                    context.end_workers()  # else leaving waits for what runs, and for all that was submitted
+                    executor.shutdown(cancel_futures=True)
                 raise
+
+
+@contextmanager
+def _cancelled_is_no_error() -> Iterator[None]:
+    """Keep the thread of an executor from printing a traceback for futures that were cancelled.
+
+    Before Python 3.12, it fails to tell them that the workers have ended.
+    """
+    before = threading.excepthook
+
+    def report(error: threading.ExceptHookArgs) -> None:
+        if not issubclass(error.exc_type, InvalidStateError):
+            before(error)
+
+    threading.excepthook = report
+    try:
+        yield
+    finally:
+        threading.excepthook = before
 
 
 @contextmanager

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -61,6 +62,23 @@ def test_what_done_raises_stops_the_rest() -> None:
             run_map(slow, range(100), threads, done=stop)
         stopped.set()
     assert len(started) <= 2
+
+
+class _Interrupted(ThreadPoolExecutor):
+    """Gets Ctrl-C with each task that it is given, when it holds locks; counts the tasks."""
+
+    n_submitted = 0
+
+    def submit(self, *args, **options) -> Future:
+        signal.raise_signal(signal.SIGINT)
+        self.n_submitted += 1
+        return super().submit(*args, **options)
+
+
+def test_ctrl_c_waits_until_everything_is_submitted() -> None:
+    with _Interrupted(1) as threads, pytest.raises(KeyboardInterrupt):
+        run_map(square, range(5), threads)
+    assert threads.n_submitted == 5
 
 
 def _stop_while_one_works(error: type[BaseException], stopped: list[float]) -> None:
