@@ -22,6 +22,7 @@ __all__ = [
     "UNITS",
     "angle_about",
     "carry_path",
+    "check_winding",
     "read_path",
     "rows_before_centre",
     "winding_side",
@@ -116,12 +117,7 @@ def carry_path(path: ArrayLike, pose: CochleaPose, *, path_side: Side | str) -> 
         Not points, or the path winds as in an ear of the other side.
     """
     points, side = as_points(path, "path"), Side.parse(path_side)
-    wound = winding_side(points)
-    if wound not in (None, side):
-        raise GpError(
-            f"the path is declared as that of a {side.word} ear, but winds as in a {side.other.word} ear",
-            remedy="Check its side, which way its axes point, and that it runs from the base to the apex.",
-        )
+    check_winding(points, side)
     return pose.transform_to_touches.apply(points if side is pose.side else points * _MIRROR_Z)
 
 
@@ -162,6 +158,30 @@ def winding_side(path: ArrayLike) -> Side | None:
     if abs(turn) < _LEAST_WINDING:
         return None
     return Side.LEFT if turn < 0 else Side.RIGHT
+
+
+def check_winding(path: ArrayLike, side: Side | str) -> None:
+    """Raise where a path winds as in an ear of the other side.
+
+    Parameters
+    ----------
+    path : (N, 3) array_like, mm, cochlea frame
+        From the base to the apex.
+    side : {"L", "R"}
+        The ear that the path is declared to be for.
+
+    Raises
+    ------
+    GpError
+        Not points, or they wind the other way.
+    """
+    declared = Side.parse(side)
+    if winding_side(path) not in (None, declared):
+        other = declared.other.word
+        raise GpError(
+            f"the path is declared as that of a {declared.word} ear, but winds as in a {other} ear",
+            remedy="Check its side, which way its axes point, and that it runs from the base to the apex.",
+        )
 
 
 def write_path(path: str | PathLike[str], points: FloatArray) -> None:

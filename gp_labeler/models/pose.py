@@ -17,6 +17,7 @@ from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import EXTERNAL, RECOMMENDED, Side
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.gate import GateReason, named_for_other_side, reasons_against_writing
+from gp_core.pose.insertion_path import check_winding
 from gp_core.pose.mixture import Hypothesis
 from gp_core.pose.next_touch import TouchGain, gains
 from gp_labeler.document import touching
@@ -437,8 +438,8 @@ class PoseModel:
 
     def carry(self, path: InsertionPath | None) -> None:
         """Carry an insertion path to the estimate, or none any more; raises `GpError` where it cannot be."""
-        if path is not None and self.estimate is not None:
-            path.in_touches(self.estimate)
+        if path is not None:
+            check_winding(path.points, path.side)
         self._path = path
         self.path_changed.emit(path)
         self.changed.emit()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -14,6 +17,7 @@ from gp_labeler.document.state import SpecimenState
 from gp_labeler.document.touches import TouchHow
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.pose import ORDER
+from gp_labeler.models.pose_exports import InsertionPath
 from gp_labeler.models.workspace import Workspace
 
 
@@ -240,3 +244,13 @@ def test_a_feature_that_is_touched_again_is_done_again(workspace, animal):
     workspace.pose.set_target(first)
     workspace.pose.record(animal[first] + 0.1, TouchHow.TYPED)
     assert workspace.pose.target == ORDER[3], "it goes on with what is untouched"
+
+
+def test_a_path_that_winds_the_other_way_is_refused_before_any_touch(workspace):
+    turn = np.linspace(0, 2 * np.pi, 20)
+    points = np.stack([turn, 2 * np.cos(turn), -2 * np.sin(turn)], axis=1)
+    left = InsertionPath(points, Side.LEFT, Path("path.csv"))
+    workspace.pose.carry(left)
+    with pytest.raises(GpError, match="declared as that of a right ear, but winds as in a left ear"):
+        workspace.pose.carry(replace(left, side=Side.RIGHT))
+    assert workspace.pose.path is left
