@@ -20,8 +20,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 import numpy as np  # noqa: E402
 import SimpleITK  # noqa: E402
 from big_scans import THRESHOLD, anonymous_mb, scan_file  # noqa: E402
+from event_loop import wait  # noqa: E402
 from hands import rest  # noqa: E402
-from qtpy.QtTest import QTest  # noqa: E402
 
 from gp_labeler.document.state import How  # noqa: E402
 from gp_labeler.imaging import readers  # noqa: E402
@@ -34,13 +34,13 @@ def work_on(window: MainWindow, path: Path, *, cancelled: bool) -> None:
     workspace = window.workspace
     if cancelled:
         workspace.scan.open(path, spacing=0.1)
-        QTest.qWait(30)
+        wait(30)
         workspace.jobs.cancel_all()
         while workspace.jobs.running:
-            QTest.qWait(10)
+            wait(10)
     workspace.scan.open(path, spacing=0.1)
     while workspace.scan.volume is None or workspace.jobs.running:
-        QTest.qWait(10)
+        wait(10)
     workspace.scan.set_threshold(THRESHOLD)
     rest(window)
     middle = workspace.scan.volume.extent.mean(axis=0)
@@ -55,8 +55,8 @@ def work_on(window: MainWindow, path: Path, *, cancelled: bool) -> None:
 def rest_closed(window: MainWindow) -> None:
     """Wait until nothing runs any more."""
     while window.workspace.jobs.running:
-        QTest.qWait(10)
-    QTest.qWait(50)
+        wait(10)
+    wait(50)
 
 
 def n_handles() -> int:

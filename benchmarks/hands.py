@@ -23,6 +23,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 import numpy as np  # noqa: E402
 from big_scans import THRESHOLD, scan_file  # noqa: E402
+from event_loop import wait  # noqa: E402
 from qtpy.QtCore import QCoreApplication, QEvent  # noqa: E402
 from qtpy.QtTest import QTest  # noqa: E402
 
@@ -125,8 +126,8 @@ def opened(path: Path) -> MainWindow:
 def rest(window: MainWindow) -> None:
     """Wait until all work is done and the bone is drawn finely."""
     while window.workspace.jobs.running or not window.grid.scene_view.scene.is_fine:
-        QTest.qWait(20)
-    QTest.qWait(50)
+        wait(20)
+    wait(50)
 
 
 def main() -> None:

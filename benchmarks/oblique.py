@@ -16,9 +16,10 @@ from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT)]
+sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 import numpy as np  # noqa: E402
+from event_loop import wait  # noqa: E402
 from qtpy.QtTest import QTest  # noqa: E402
 from scipy.ndimage import gaussian_filter, zoom  # noqa: E402
 from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
@@ -68,7 +69,7 @@ def shown(volume: Volume) -> MainWindow:
     window.workspace.scan.begin(volume)
     window.workspace.scan.set_threshold(11_000)
     while window.workspace.jobs.running:
-        QTest.qWait(50)
+        wait(50)
     return window
 
 

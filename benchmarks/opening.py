@@ -23,6 +23,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 import numpy as np  # noqa: E402
 from big_scans import SPACING, THRESHOLD, scan_file  # noqa: E402
+from event_loop import wait  # noqa: E402
 from hands import rest  # noqa: E402
 from qtpy.QtCore import Qt, QTimer  # noqa: E402
 from qtpy.QtTest import QTest  # noqa: E402
@@ -98,8 +99,8 @@ def cpu_of(command: list[str]) -> float:
 def rest_of_start(window: MainWindow) -> None:
     """Wait until nothing runs any more."""
     while window.workspace.jobs.running:
-        QTest.qWait(20)
-    QTest.qWait(200)
+        wait(20)
+    wait(200)
 
 
 def report_opening(window: MainWindow, path: Path, voxels: int) -> None:
@@ -119,7 +120,7 @@ def report_opening(window: MainWindow, path: Path, voxels: int) -> None:
     scan = window.workspace.scan
     scan.open(path, spacing=max(SPACING, LEAST_MM / voxels))
     while scan.volume is None or window.workspace.jobs.running:
-        QTest.qWait(10)
+        wait(10)
     scan.set_threshold(THRESHOLD)
     rest(window)
     timer.stop()

@@ -18,10 +18,11 @@ from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT)]
+sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 import numpy as np  # noqa: E402
-from qtpy.QtCore import QEventLoop, QPoint, QPointF, Qt, QTimer  # noqa: E402
+from event_loop import wait  # noqa: E402
+from qtpy.QtCore import QPoint, QPointF, Qt, QTimer  # noqa: E402
 from qtpy.QtTest import QTest  # noqa: E402
 
 from gp_core.validation import FloatArray  # noqa: E402
@@ -70,13 +71,6 @@ def sphere_field(millions: float) -> Volume:
     rng = np.random.default_rng(0)
     values = 1000 * (field - level) + rng.normal(0, 8, field.shape)
     return Volume.from_parts(values.astype(np.int16), [1 / PER_MM] * 3, [0.0, 0.0, 0.0], name="balls")
-
-
-def wait(ms: int) -> None:
-    """Let the event loop run; `QTest.qWait` keeps Python's lock, and jobs would take three times as long."""
-    loop = QEventLoop()
-    QTimer.singleShot(ms, loop.quit)
-    loop.exec()
 
 
 def rest(window: MainWindow) -> None:
