@@ -232,6 +232,31 @@ def _check_round(number: int) -> None:
 
 
 @dataclass(frozen=True)
+class _BothSides:
+    """The landmarks of a state as one set a side, and what these sets were made from."""
+
+    landmarks: Mapping[PointKey, Landmark]
+    scan_evidence: Mapping[Side, ScanEvidence]
+    sets: Mapping[Side, LandmarkSet]
+
+    @classmethod
+    def of(
+        cls, landmarks: Mapping[PointKey, Landmark], scan_evidence: Mapping[Side, ScanEvidence]
+    ) -> _BothSides:
+        """Make both sets; raises `GpError` where they cannot be."""
+        kept = MappingProxyType({key: mark for key, mark in landmarks.items() if mark != TO_DO})
+        sets = {side: _landmark_set(kept, side, scan_evidence.get(side)) for side in Side}
+        return cls(kept, scan_evidence, MappingProxyType(sets))
+
+    def are_of(self, state: SpecimenState) -> bool:
+        """Whether they were made from the very objects that a state holds."""
+        return state.landmarks is self.landmarks and state.scan_evidence is self.scan_evidence
+
+
+_NOT_MADE = _BothSides({}, {}, {})
+
+
+@dataclass(frozen=True)
 class SpecimenState:
     """Everything that is saved of a specimen.
 
@@ -294,7 +319,7 @@ class SpecimenState:
     round: int = 1
     blind: bool = False
     others: tuple[StoredLabelling, ...] = ()
-    sets: Mapping[Side, LandmarkSet] = field(init=False, repr=False, compare=False)
+    _sides: _BothSides = field(default=_NOT_MADE, repr=False, compare=False)  # passed on to copies
 
     def __post_init__(self) -> None:
         name = self.specimen.strip()
@@ -303,16 +328,15 @@ class SpecimenState:
                 f"a specimen's name must be a valid file name, got {self.specimen!r}",
                 remedy="For example GP-014.",
             )
-        kept = {key: mark for key, mark in self.landmarks.items() if mark != TO_DO}
-        sets = {side: _landmark_set(kept, side, self.scan_evidence.get(side)) for side in Side}
+        sides = self._sides if self._sides.are_of(self) else _BothSides.of(self.landmarks, self.scan_evidence)
         if self.threshold is not None:
             object.__setattr__(self, "threshold", freeze(float(self.threshold), "threshold"))
         _check_round(self.round)
         object.__setattr__(self, "observer", " ".join(self.observer.split()))
         object.__setattr__(self, "specimen", name)
-        object.__setattr__(self, "landmarks", MappingProxyType(kept))
+        object.__setattr__(self, "landmarks", sides.landmarks)
         object.__setattr__(self, "import_choices", freeze(self.import_choices, "import choices"))
-        object.__setattr__(self, "sets", MappingProxyType(sets))
+        object.__setattr__(self, "_sides", sides)
         _check_touches(self.touches)
         object.__setattr__(self, "touches", MappingProxyType(dict(self.touches)))
         skull = {name: _plausible(position, name) for name, position in self.skull.items()}
@@ -322,6 +346,11 @@ class SpecimenState:
     def side(self, side: Side | str) -> LandmarkSet:
         """Return the landmarks of one side in the scan frame, with IN and, once determined, CO."""
         return self.sets[Side.parse(side)]
+
+    @property
+    def sets(self) -> Mapping[Side, LandmarkSet]:
+        """Both sides, as `side` returns them."""
+        return self._sides.sets
 
     @property
     def labeller(self) -> str:

@@ -28,7 +28,9 @@ from gp_labeler.document.history import History
 from gp_labeler.document.labelling_edits import BeginLabelling, OpenLabelling
 from gp_labeler.document.landmark_import import ImportLandmarks
 from gp_labeler.document.specimen_edits import RenameSpecimen, SetThreshold
-from gp_labeler.document.state import TO_DO, How, SpecimenState, point_key
+from gp_labeler.document.state import TO_DO, How, Landmark, SpecimenState, point_key
+from gp_labeler.document.touch_edits import RecordTouch
+from gp_labeler.document.touches import Touch
 
 L, R = Side.LEFT, Side.RIGHT
 
@@ -93,6 +95,24 @@ def test_no_state_is_ever_changed_in_place(sequence):
         texts.append((editing.document.state, text_of(editing.document.state)))
         done(editing, [edit])
     assert all(text_of(state) == text for state, text in texts)
+
+
+@quick
+@given(st.lists(edits, max_size=12))
+def test_the_sets_are_those_of_the_points_however_the_state_came_about(sequence):
+    states = done(Editing(), sequence)
+    for before, state in zip(states[:1] + states, states, strict=False):
+        fresh = SpecimenState(landmarks=state.landmarks, scan_evidence=state.scan_evidence)
+        for side in Side:
+            made, kept = fresh.side(side), state.side(side)
+            assert np.array_equal(made.points, kept.points, equal_nan=True)
+            assert (made.unseen, made.suggested, made.scan_evidence) == (
+                kept.unseen,
+                kept.suggested,
+                kept.scan_evidence,
+            )
+        if state.landmarks is before.landmarks:  # nothing is made again that did not change
+            assert all(state.side(side) is before.side(side) for side in Side)
 
 
 @quick
@@ -162,6 +182,13 @@ def test_co_is_computed_and_cleared_live():
     assert changed == [frozenset({(L, "RWP"), (L, "CO")}), frozenset({(L, "CB"), (L, "CO")})]
     assert editing.document.undo()
     assert editing.labels.progress(L).text == "5 of 20"
+
+
+def test_a_touch_leaves_the_sets_of_both_sides_as_they_are():
+    state = SpecimenState(landmarks={point_key(L, "CA"): Landmark((1.0, 2.0, 3.0))})
+    touched = RecordTouch(L, "ZL", Touch((4.0, 5.0, 6.0))).apply(state)
+    assert touched.touched(L).placed == ("ZL",)
+    assert all(touched.side(side) is state.side(side) for side in Side)
 
 
 def test_in_tells_both_sides():
