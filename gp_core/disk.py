@@ -2,8 +2,9 @@
 
 Only plain files of bounded size are read, so that neither a pipe nor an endless file holds the program up. A
 file is written whole or not at all: a draft beside it goes to the disk, then takes its name; whatever fails,
-the old file stays. Devices and pipes are written to, never replaced. While a command runs, what it reads is
-protected: nothing is written over it.
+the old file stays. Files that belong together take their names only when all of their drafts are written.
+Devices and pipes are written to, never replaced. While a command runs, what it reads is protected: nothing is
+written over it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ import re
 import stat
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -33,6 +36,7 @@ except ImportError:  # Windows locks open files
 __all__ = [
     "FREE_SPACE",
     "MAX_BYTES",
+    "all_or_none",
     "atomic_file",
     "check_file",
     "is_protected",
@@ -63,6 +67,7 @@ FREE_SPACE = "Free some space, or choose another folder. The file is as it was."
 _DRAFT = re.compile(r"\.(?P<name>.*)\.[0-9a-f]{8}\.tmp(\.\w+){0,2}", re.DOTALL)
 _CHUNK_BYTES = 1 << 20
 _LONGEST_NAME = 200  # bytes of the name in that of its temporary file; systems allow 255
+_MOST_LOCKS = 100  # of one batch; systems allow some hundred open files
 _FORGOTTEN_SECONDS = 3600.0  # after which any temporary file counts as abandoned
 PIPE_PATIENCE_S = 10.0  # for a reader of a pipe
 _DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(?P<number>\d+)")
@@ -253,9 +258,8 @@ def _a(what: str) -> str:
 def _unreadable(path: AnyPath, error: Exception) -> FileFormatError:
     if isinstance(error, FileNotFoundError):
         return FileFormatError("does not exist", file=path, remedy="Check the name and the folder.")
-    return FileFormatError(
-        f"cannot be read ({_reason(error)})", file=path, remedy="Check its name and permissions."
-    )
+    problem = f"cannot be read ({_reason(error)})"
+    return FileFormatError(problem, file=path, remedy="Check its name and permissions.")
 
 
 # Writing
@@ -276,9 +280,8 @@ def write_text(path: AnyPath, text: str) -> None:
     GpError
         As for `atomic_file`.
     """
-    write_bytes(
-        path, text.encode("utf-8", errors="backslashreplace")
-    )  # names may contain bytes that are not UTF-8
+    content = text.encode("utf-8", errors="backslashreplace")  # names may hold bytes that are not UTF-8
+    write_bytes(path, content)
 
 
 def write_bytes(path: AnyPath, content: bytes) -> None:
@@ -346,6 +349,27 @@ def make_room(folder: AnyPath, files: Iterable[AnyPath], *, overwrite: bool) -> 
 
 
 @contextmanager
+def all_or_none() -> Iterator[None]:
+    """Write all files of a block, or none: old files are replaced when all new ones are complete.
+
+    A block within another one leaves that to the outer one. What a block writes cannot be read from its place
+    before the block ends.
+
+    Yields
+    ------
+    None
+        While the files are written.
+
+    Raises
+    ------
+    GpError
+        As for `atomic_file`. All old files are then unchanged.
+    """
+    with _joined_batch():
+        yield
+
+
+@contextmanager
 def atomic_file(path: AnyPath) -> Iterator[Path]:
     """Write a file atomically: completely, or not at all.
 
@@ -358,7 +382,8 @@ def atomic_file(path: AnyPath) -> Iterator[Path]:
     ------
     Path
         A temporary file beside it, with the same suffix, to be written completely. It replaces the file
-        afterwards, unless an exception is raised. For a device or a pipe its content is copied there.
+        afterwards (in `all_or_none`, after all others), unless an exception is raised. For a device or a pipe
+        its content is copied there.
 
     Raises
     ------
@@ -366,27 +391,126 @@ def atomic_file(path: AnyPath) -> Iterator[Path]:
         The folder is missing, the disk or its permissions refuse, or the file is protected. The previous
         content is then unchanged.
     """
-    try:
+    with _joined_batch() as batch, _disk_errors(path), ExitStack() as resources:
         _refuse_protected(path)
-        if is_stream(path):
-            with _temporary_draft(path) as draft:
-                yield draft
-                _send(path, draft.read_bytes())
+        written = (_begin_stream if is_stream(path) else _begin_file)(path, resources)
+        yield written.draft
+        written.finish()
+        batch.take(written, resources.pop_all())
+
+
+class _Batch:
+    """Files that belong together: their drafts wait until all are written.
+
+    Parameters
+    ----------
+    resources : ExitStack
+        Deletes the drafts that were not put in place.
+    """
+
+    def __init__(self, resources: ExitStack) -> None:
+        self._resources = resources
+        self._written: list[_Written] = []
+
+    def take(self, written: _Written, resources: ExitStack) -> None:
+        """Add a complete draft. Locks of the earliest are given up before there are too many open files."""
+        self._resources.push(resources)
+        self._written.append(written)
+        for earliest in self._written[:-_MOST_LOCKS][-1:]:
+            earliest.lock.close()
+
+    def put_in_place(self) -> None:
+        """Send the streams, which may still fail, then replace the files."""
+        for written in sorted(self._written, key=lambda each: not is_stream(each.path)):
+            written.put_in_place()
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A draft, and the file that it becomes."""
+
+    draft: Path
+    path: AnyPath
+    lock: ExitStack = field(default_factory=ExitStack)
+
+    def finish(self) -> None:
+        if is_stream(self.path):
             return
-        target = Path(os.path.realpath(path))  # keep a symbolic link
-        _check_target(target, path)
-        remove_drafts(target.parent, target.name)
-        with _locked_draft(target) as draft:
-            yield draft
-            _to_disk(draft)
-            if target.exists():
-                draft.chmod(stat.S_IMODE(target.stat().st_mode))
-            draft.replace(target)
-        _log.debug("wrote %s", printable(str(target)))
-        with contextlib.suppress(OSError):  # flush the directory entry too, where the system can
-            _to_disk(target.parent)
+        _to_disk(self.draft)
+        target = _target(self.path)
+        if target.exists():
+            self.draft.chmod(stat.S_IMODE(target.stat().st_mode))
+
+    def put_in_place(self) -> None:
+        with _disk_errors(self.path):
+            if is_stream(self.path):
+                _send(self.path, self.draft.read_bytes())
+                return
+            target = _target(self.path)
+            self.draft.replace(target)
+            _log.debug("wrote %s", printable(str(target)))
+            with contextlib.suppress(OSError):  # flush the directory entry too, where the system can
+                _to_disk(target.parent)
+
+
+_batch: ContextVar[_Batch | None] = ContextVar("_batch", default=None)
+
+
+@contextmanager
+def _joined_batch() -> Iterator[_Batch]:
+    """Join the batch of an outer block, or open one and put its files in place at the end."""
+    outer = _batch.get()
+    if outer is not None:
+        yield outer
+        return
+    with ExitStack() as resources:
+        batch = _Batch(resources)
+        outside = _batch.set(batch)
+        try:
+            yield batch
+        finally:
+            _batch.reset(outside)
+        batch.put_in_place()
+
+
+@contextmanager
+def _disk_errors(path: AnyPath) -> Iterator[None]:
+    """Report what the disk refuses, in words that name the file."""
+    try:
+        yield
     except (OSError, ValueError) as error:
         raise GpError(f"cannot be written ({_reason(error)})", file=path, remedy=_remedy(error)) from None
+
+
+def _target(path: AnyPath) -> Path:
+    return Path(os.path.realpath(path))  # keep a symbolic link
+
+
+def _begin_file(path: AnyPath, resources: ExitStack) -> _Written:
+    """Create a temporary file beside a file, which `remove_drafts` ignores while this program runs."""
+    target = _target(path)
+    _check_target(target, path)
+    remove_drafts(target.parent, target.name)
+    name = os.fsdecode(os.fsencode(target.name)[:_LONGEST_NAME])
+    draft = target.with_name(f".{name}.{os.urandom(4).hex()}.tmp{_ending(target)[:20]}")
+    descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    lock = resources.enter_context(ExitStack())
+    lock.callback(os.close, descriptor)
+    resources.callback(draft.unlink, missing_ok=True)
+    if fcntl is None:
+        lock.close()  # Windows cannot rename an open file
+    else:
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+    return _Written(draft, path, lock)
+
+
+def _begin_stream(path: AnyPath, resources: ExitStack) -> _Written:
+    """Return a temporary file for what goes to a stream."""
+    import tempfile
+
+    folder = resources.enter_context(tempfile.TemporaryDirectory())
+    return _Written(Path(folder, f"draft{_ending(Path(path))}"), path)
 
 
 def remove_drafts(folder: Path, name: str | None = None) -> None:
@@ -416,26 +540,6 @@ def _check_target(target: Path, path: AnyPath) -> None:
     as_we_are = os.access in os.supports_effective_ids
     if target.exists() and not os.access(target, os.W_OK, effective_ids=as_we_are):  # the folder is enough
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-
-
-@contextmanager
-def _locked_draft(target: Path) -> Iterator[Path]:
-    """Create a temporary file that `remove_drafts` ignores while this program runs."""
-    name = os.fsdecode(os.fsencode(target.name)[:_LONGEST_NAME])
-    draft = target.with_name(f".{name}.{os.urandom(4).hex()}.tmp{_ending(target)[:20]}")
-    descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-    try:
-        if fcntl is None:
-            os.close(descriptor)  # Windows cannot rename an open file
-            descriptor = -1
-        else:
-            with contextlib.suppress(OSError):  # a file system without locks
-                fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield draft
-    finally:
-        draft.unlink(missing_ok=True)
-        if descriptor >= 0:
-            os.close(descriptor)
 
 
 def _ending(path: Path) -> str:
@@ -500,14 +604,6 @@ def _own_descriptor(path: AnyPath) -> int | None:
     name = str(Path(path).absolute())
     match = _DESCRIPTOR.fullmatch(name)
     return int(match["number"]) if match else _STREAMS.get(name)
-
-
-@contextmanager
-def _temporary_draft(path: AnyPath) -> Iterator[Path]:
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as folder:
-        yield Path(folder, f"draft{_ending(Path(path))}")
 
 
 def _send(path: AnyPath, content: bytes) -> None:

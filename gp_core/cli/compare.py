@@ -24,6 +24,7 @@ from gp_core.cli.study_options import (
     save_figure_of,
     settings_of,
 )
+from gp_core.disk import all_or_none
 from gp_core.registration.jrmpc import ESTIMATION
 from gp_core.study.compare import ComparisonReport, compare
 
@@ -89,10 +90,11 @@ def run(args: argparse.Namespace) -> int:
             settings=settings_of(args, ESTIMATION),
             executor=executor,
         )
-    save_json(args.json, {**report.as_dict(), "seed": args.seed})
-    if args.csv:
-        report.save_csv(args.csv)
-    save_figure_of(args.figure, "comparison", report)
+    with all_or_none():
+        save_json(args.json, {**report.as_dict(), "seed": args.seed})
+        if args.csv:
+            report.save_csv(args.csv)
+        save_figure_of(args.figure, "comparison", report)
     for line in _comparison_lines(report):
         say(line)
     return 0

@@ -18,6 +18,7 @@ from gp_core.cli.study_options import (
     add_figure,
     save_figure_of,
 )
+from gp_core.disk import all_or_none
 from gp_core.study.distance_check import DISAGREES_SD, DistanceCheck, check_distances
 from gp_core.study.distances import DistanceTable, distances
 
@@ -69,10 +70,11 @@ def run(args: argparse.Namespace) -> int:
     content = table.as_dict()
     if args.check:
         content["sides"] = [{"specimen": name} | check.as_dict() for name, check in checks]
-    save_json(args.json, content)
-    if args.csv:
-        table.save_csv(args.csv)
-    save_figure_of(args.figure, "distance_matrix", table)
+    with all_or_none():
+        save_json(args.json, content)
+        if args.csv:
+            table.save_csv(args.csv)
+        save_figure_of(args.figure, "distance_matrix", table)
     for line in _distance_lines(table):
         say(line)
     for line in _check_lines(checks) if args.check else ():

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.cli.options import Subparsers, add_command, say
 from gp_core.cli.study_options import add_seed
-from gp_core.disk import write_text
+from gp_core.disk import all_or_none, write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import modiolar_axis
 from gp_core.study.drawn_labels import draw_labels, draw_touches
@@ -84,25 +85,36 @@ def run(args: argparse.Namespace) -> int:
     if args.output is None and args.csv is None:
         raise GpError("there is nothing to write", remedy="Name a folder (-o DIR), or a file (--csv FILE).")
     atlas = Atlas.published() if args.atlas is None else Atlas.load(args.atlas)
-    if args.output is not None:
-        written = draw_labels(
-            args.output,
-            args.n,
-            atlas=atlas,
-            observers=args.observers,
-            rounds=args.rounds,
-            label_error_mm=args.label_error,
-            seed=args.seed,
-            overwrite=args.replace,
-        )
-        say(f"{len(written)} landmark files in {args.output}")
-    if args.csv is not None:
-        touches, truth = draw_touches(atlas=atlas, touch_error_mm=args.touch_error, seed=args.seed)
-        points = ((code, touches[code]) for code in touches.placed)
-        rows = (f"{code},{x:.3f},{y:.3f},{z:.3f}\n" for code, (x, y, z) in points)
-        write_text(args.csv, "".join(rows))
-        say(f"{len(touches.placed)} touches in {args.csv}; the cochlea truly has")
-        say("  origin CO     " + "".join(f"{v:11.3f}" for v in truth["CO"]) + " mm")
-        axis = modiolar_axis(truth["CA"], truth["CB"])
-        say("  axis CB->CA   " + "".join(f"{v:11.4f}" for v in axis))
+    with all_or_none():
+        lines = [
+            *(_draw_labels(args, atlas) if args.output is not None else ()),
+            *(_draw_touches(args, atlas) if args.csv is not None else ()),
+        ]
+    for line in lines:
+        say(line)
     return 0
+
+
+def _draw_labels(args: argparse.Namespace, atlas: Atlas) -> Iterator[str]:
+    written = draw_labels(
+        args.output,
+        args.n,
+        atlas=atlas,
+        observers=args.observers,
+        rounds=args.rounds,
+        label_error_mm=args.label_error,
+        seed=args.seed,
+        overwrite=args.replace,
+    )
+    yield f"{len(written)} landmark files in {args.output}"
+
+
+def _draw_touches(args: argparse.Namespace, atlas: Atlas) -> Iterator[str]:
+    touches, truth = draw_touches(atlas=atlas, touch_error_mm=args.touch_error, seed=args.seed)
+    points = ((code, touches[code]) for code in touches.placed)
+    rows = (f"{code},{x:.3f},{y:.3f},{z:.3f}\n" for code, (x, y, z) in points)
+    write_text(args.csv, "".join(rows))
+    yield f"{len(touches.placed)} touches in {args.csv}; the cochlea truly has"
+    yield "  origin CO     " + "".join(f"{v:11.3f}" for v in truth["CO"]) + " mm"
+    axis = modiolar_axis(truth["CA"], truth["CB"])
+    yield "  axis CB->CA   " + "".join(f"{v:11.4f}" for v in axis)

@@ -23,7 +23,7 @@ from gp_core.cli.options import (
     say,
 )
 from gp_core.constants import METHODS, MM_PER_DEGREE
-from gp_core.disk import write_text
+from gp_core.disk import all_or_none, write_text
 from gp_core.errors import GpError, blaming
 from gp_core.frames import angle_between_deg
 from gp_core.io import read_touches
@@ -413,19 +413,20 @@ def _write(
     if path is not None:
         with blaming(args.path):
             carried = carry_path(path, pose, path_side=args.path_side)
-    if args.json:
-        write_text(args.json, pose_text(answer))
-    if held_back:
-        return
-    if path is not None:
-        write_path(args.path_out, carried)
-    for save, file in (
-        (pose.save_tfm, args.tfm),
-        (pose.save_csv, args.csv),
-        (pose.save_landmarks, args.landmarks),
-    ):
-        if file:
-            save(file)
+    with all_or_none():
+        if args.json:
+            write_text(args.json, pose_text(answer))
+        if held_back:
+            return
+        if path is not None:
+            write_path(args.path_out, carried)
+        for save, file in (
+            (pose.save_tfm, args.tfm),
+            (pose.save_csv, args.csv),
+            (pose.save_landmarks, args.landmarks),
+        ):
+            if file:
+                save(file)
 
 
 def _remarks(

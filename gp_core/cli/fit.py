@@ -26,6 +26,7 @@ from gp_core.cli.options import (
     save_json,
     say,
 )
+from gp_core.disk import all_or_none
 from gp_core.errors import GpError
 from gp_core.landmarks.sets import Specimen
 
@@ -92,8 +93,9 @@ def run(args: argparse.Namespace) -> int:
         name = args.name or f"{len(specimens)} specimens"
         atlas = fit_screened_atlas(screened, name=name, by_certainty=weights)
     atlas = atlas if error is None else atlas.with_labelling_error(error)
-    atlas.save(args.output)
-    save_json(args.json, _fit_report(atlas, screened, kept=args.keep_doubtful))
+    with all_or_none():
+        atlas.save(args.output)
+        save_json(args.json, _fit_report(atlas, screened, kept=args.keep_doubtful))
     _say_screened(screened, kept=args.keep_doubtful)
     spread = np.sqrt(atlas.variances(atlas.codes))
     say(f"Atlas of {len(atlas.specimens)} animals, {atlas.n_samples} sides: {args.output}")

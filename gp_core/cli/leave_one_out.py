@@ -23,6 +23,7 @@ from gp_core.cli.study_options import (
     save_figure_of,
     settings_of,
 )
+from gp_core.disk import all_or_none
 from gp_core.registration.jrmpc import ESTIMATION
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out, summarise
 
@@ -73,8 +74,9 @@ def run(args: argparse.Namespace) -> int:
         probe=probe,
         settings=settings_of(args, ESTIMATION),
     )
-    save_json(args.json, report.as_dict())
-    save_figure_of(args.figure, "error_histograms", report)
+    with all_or_none():
+        save_json(args.json, report.as_dict())
+        save_figure_of(args.figure, "error_histograms", report)
     for line in _leave_one_out_lines(report):
         say(line)
     return 0

@@ -22,6 +22,7 @@ from gp_core.landmarks.sets import Specimen
 from gp_core.standard_streams import standard_streams
 
 __all__ = [
+    "WRITTEN",
     "AtlasSource",
     "Subparsers",
     "add_atlas",
@@ -45,7 +46,7 @@ __all__ = [
 Subparsers = Any
 """What `argparse.ArgumentParser.add_subparsers` returns; its class is private."""
 
-_WRITTEN = ("json", "tfm", "csv", "landmarks", "path_out", "figure", "output", "checkpoint")
+WRITTEN = ("json", "tfm", "csv", "landmarks", "path_out", "figure", "output", "checkpoint")
 """Names of the options whose files are written; every other word that is a file is read."""
 
 _ENDINGS = {
@@ -297,7 +298,7 @@ def keeping_inputs(args: argparse.Namespace) -> Iterator[None]:
         need_extra("figures")  # before hours of work, not after them
     with protected_inputs(_files_read(args)):
         written: dict[str, str] = {}
-        for name in _WRITTEN:
+        for name in WRITTEN:
             word = getattr(args, name, None)
             if word is None:
                 continue
@@ -367,7 +368,7 @@ def _files_read(args: argparse.Namespace) -> Iterator[str | Path]:
 
 def _words_read(args: argparse.Namespace) -> Iterator[str]:
     for name, value in vars(args).items():
-        if name not in _WRITTEN:
+        if name not in WRITTEN:
             values = value if isinstance(value, list) else [value]
             yield from (word for word in values if isinstance(word, str))
 

@@ -17,6 +17,7 @@ from gp_core.cli.options import (
     say,
 )
 from gp_core.cli.study_options import add_figure, add_seed, rng_of, save_figure_of
+from gp_core.disk import all_or_none
 from gp_core.io import read_landmarks, read_touches
 from gp_core.io.stl import read_stl
 from gp_core.study.physical import PhysicalReport, physical_simulations, physical_test
@@ -92,12 +93,14 @@ def run(args: argparse.Namespace) -> int:
         specimens=specimens,
         bone=None if args.bone is None else read_stl(args.bone),
     )
-    save_json(args.json, report.as_dict())
     if args.figure is not None:
         simulated = physical_simulations(
             touches, specimens=specimens, atlas=atlas, n=args.n, noise=args.noise, rng=rng
         )
-        save_figure_of(args.figure, "draw_physical", report, simulated)
+    with all_or_none():
+        save_json(args.json, report.as_dict())
+        if args.figure is not None:
+            save_figure_of(args.figure, "draw_physical", report, simulated)
     for line in _lines(report):
         say(line)
     return 0

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from gp_core.cli.options import Subparsers, add_command, add_json, add_names, lab_names, save_json, say
-from gp_core.disk import write_text
+from gp_core.disk import all_or_none, write_text
 from gp_core.errors import blaming
 from gp_core.io import read_landmarks, read_touches
 from gp_core.io.tfm import tfm_text
@@ -68,9 +68,10 @@ def run(args: argparse.Namespace) -> int:
             points_by_name(touches), points_by_name(ct), dst=ct.frame, src=touches.frame
         )
     content = found.as_dict() | _at_cochlea(found, ct)
-    save_json(args.json, content)
-    if args.tfm:
-        write_text(args.tfm, tfm_text(found.T_scan_tracker))
+    with all_or_none():
+        save_json(args.json, content)
+        if args.tfm:
+            write_text(args.tfm, tfm_text(found.T_scan_tracker))
     for line in _register_lines(found, content):
         say(line)
     return 0

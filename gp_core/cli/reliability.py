@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from gp_core.cli.options import Subparsers, add_command, add_json, add_names, lab_names, save_json, say
 from gp_core.cli.study_options import add_figure, add_seed, rng_of, save_figure_of
+from gp_core.disk import all_or_none
 from gp_core.io import load_labellings
 from gp_core.study.agreement import ErrorSummary, IntraclassCorrelation
 from gp_core.study.reliability import FeatureReliability, ReliabilityReport, reliability
@@ -61,10 +62,11 @@ def run(args: argparse.Namespace) -> int:
     """
     rng = rng_of(args)
     report = reliability(load_labellings(args.specimens, names=lab_names(args)), rng=rng)
-    save_json(args.json, report.as_dict())
-    if args.csv:
-        report.save_csv(args.csv)
-    save_figure_of(args.figure, "label_agreement", report)
+    with all_or_none():
+        save_json(args.json, report.as_dict())
+        if args.csv:
+            report.save_csv(args.csv)
+        save_figure_of(args.figure, "label_agreement", report)
     for line in _lines(report):
         say(line)
     return 0

@@ -25,6 +25,7 @@ from gp_core.cli.study_options import (
     save_figure_of,
     settings_of,
 )
+from gp_core.disk import all_or_none
 from gp_core.landmarks.features import CODES, PROBE
 from gp_core.registration.jrmpc import DEFAULTS
 from gp_core.study.leave_one_out import summarise
@@ -104,9 +105,10 @@ def run(args: argparse.Namespace) -> int:
             checkpoint=args.checkpoint,
             progress=line,
         )
-    save_json(args.json, report.as_dict())
-    nested = isinstance(report, NestedReport)
-    save_figure_of(args.figure, "nested_errors" if nested else "search_curves", report)
+    drawing = "nested_errors" if isinstance(report, NestedReport) else "search_curves"
+    with all_or_none():
+        save_json(args.json, report.as_dict())
+        save_figure_of(args.figure, drawing, report)
     for text in _nested_lines(report) if isinstance(report, NestedReport) else _lines(report):
         say(text)
     return 0

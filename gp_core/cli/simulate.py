@@ -27,7 +27,7 @@ from gp_core.cli.study_options import (
     save_figure_of,
     settings_of,
 )
-from gp_core.disk import read_json
+from gp_core.disk import all_or_none, read_json
 from gp_core.errors import FileFormatError
 from gp_core.registration.jrmpc import ESTIMATION
 from gp_core.study.simulation import SimulationReport, simulate
@@ -102,8 +102,9 @@ def run(args: argparse.Namespace) -> int:
             noise=args.noise,
             executor=executor,
         )
-    save_json(args.json, {**report.as_dict(), "seed": args.seed})
-    save_figure_of(args.figure, "error_boxes", report, physical)
+    with all_or_none():
+        save_json(args.json, {**report.as_dict(), "seed": args.seed})
+        save_figure_of(args.figure, "error_boxes", report, physical)
     for line in _simulation_lines(report):
         say(line)
     return 0

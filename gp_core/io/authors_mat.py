@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gp_core.argument_types import checks_arguments
+from gp_core.disk import all_or_none
 from gp_core.errors import FileFormatError, GpError
 from gp_core.io.file_names import landmark_file_name
 from gp_core.io.markups import write_markups
@@ -97,10 +98,11 @@ def import_mat(
     if not overwrite and (there := next((file for file in files if file.exists()), None)):
         remedy = "Name an empty folder, or replace what is there (--replace)."
         raise GpError("already exists", file=there, remedy=remedy)
-    for file, (name, landmarks) in files.items():
-        source = Path(path_left if landmarks.side is Side.LEFT else path_right).name
-        provenance = {code: {"method": "imported", "source": source} for code in landmarks.placed}
-        write_markups(file, landmarks, specimen=name, provenance=provenance)
+    with all_or_none():
+        for file, (name, landmarks) in files.items():
+            source = Path(path_left if landmarks.side is Side.LEFT else path_right).name
+            provenance = {code: {"method": "imported", "source": source} for code in landmarks.placed}
+            write_markups(file, landmarks, specimen=name, provenance=provenance)
     return list(files)
 
 

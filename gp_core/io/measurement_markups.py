@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gp_core.argument_types import checks_arguments
-from gp_core.disk import make_room
+from gp_core.disk import all_or_none, make_room
 from gp_core.errors import FileFormatError, GpError
 from gp_core.io.header import FileHeader
 from gp_core.io.labelled_points import LabelledPoint
@@ -100,8 +100,9 @@ def write_measurements(
     paths = [Path(folder) / names[each.name] for each in measurements]
     make_room(folder, paths, overwrite=overwrite)
     header = FileHeader(specimen=specimen, volume=volume)
-    for path, measurement in zip(paths, measurements, strict=True):
-        write_content(path, [_as_json(measurement)], header)
+    with all_or_none():
+        for path, measurement in zip(paths, measurements, strict=True):
+            write_content(path, [_as_json(measurement)], header)
     return tuple(paths)
 
 

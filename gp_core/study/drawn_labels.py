@@ -12,6 +12,7 @@ import numpy as np
 from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.sampling import draw_animal
+from gp_core.disk import all_or_none
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.io.file_names import landmark_file_name
@@ -155,6 +156,7 @@ def _write(folder: Path, files: dict[Path, tuple[str, LandmarkSet]], overwrite: 
     if not overwrite and (there := next((file for file in files if file.exists()), None)):
         remedy = "Name an empty folder, or replace what is there (--replace)."
         raise GpError("already exists", file=there, remedy=remedy)
-    for file, (name, landmarks) in files.items():
-        provenance = {code: {"method": "drawn"} for code in landmarks.placed}
-        write_markups(file, landmarks, specimen=name, provenance=provenance)
+    with all_or_none():
+        for file, (name, landmarks) in files.items():
+            provenance = {code: {"method": "drawn"} for code in landmarks.placed}
+            write_markups(file, landmarks, specimen=name, provenance=provenance)

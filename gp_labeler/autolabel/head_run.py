@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gp_core.disk import read_json, write_text
+from gp_core.disk import all_or_none, read_json, write_text
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.library import TemplateLibrary
@@ -134,9 +134,10 @@ class HeadRun:
                 "spacing": list(volume.spacing),
                 "checksum": volume.checksum,
             }
-            files = write_proposal(self.output, name, proposal, about)
             content = self._content(name, key, proposal)
-            write_text(report, json.dumps(content, indent=1) + "\n")
+            with all_or_none():
+                files = write_proposal(self.output, name, proposal, about)
+                write_text(report, json.dumps(content, indent=1) + "\n")
         except GpError as error:
             return HeadResult(path, problem=str(error))
         return HeadResult(path, (*files, report), content)

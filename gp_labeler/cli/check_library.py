@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gp_core.command_line import CommandParser
-from gp_core.disk import protected_inputs, write_text
+from gp_core.disk import all_or_none, protected_inputs, write_text
 from gp_core.standard_streams import shown_path, standard_streams
 from gp_labeler.cli.propose import add_library_options, library_of, prepare
 
@@ -81,9 +81,12 @@ def _check(args: argparse.Namespace) -> int:
         prepare(library, engine, executor)
         predictions = library.held_out(HereRegistration(engine))
         check = check_predictions(library.scans, predictions)
-        if args.json is not None:
-            write_text(args.json, json.dumps(check.as_json(), indent=1) + "\n")
-        drawn = draw_library_check(check, library.scans, predictions, args.pictures) if args.pictures else ()
+        with all_or_none():
+            if args.json is not None:
+                write_text(args.json, json.dumps(check.as_json(), indent=1) + "\n")
+            drawn = (
+                draw_library_check(check, library.scans, predictions, args.pictures) if args.pictures else ()
+            )
     for name in check.checked:
         found = check.of(name)
         sys.stdout.write(f"{name}: {f'{len(found)} to review' if found else 'agrees with the others'}\n")

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gp_core.command_line import CommandParser
-from gp_core.disk import protected_inputs
+from gp_core.disk import all_or_none, protected_inputs
 from gp_core.standard_streams import standard_streams
+
+if TYPE_CHECKING:
+    from gp_labeler.document.state import SpecimenState
 
 __all__ = ["make_export_parser", "run_export"]
 
@@ -58,22 +62,28 @@ def run_export(arguments: Sequence[str]) -> int:
 
 
 def _export(args: argparse.Namespace) -> int:
-    from gp_labeler.document.landmark_export import export_landmarks  # here: `--help` need not wait
-    from gp_labeler.document.measurement_export import export_measurements
-    from gp_labeler.document.specimen_file import read_specimen
+    from gp_labeler.document.specimen_file import read_specimen  # here: `--help` need not wait
 
     states = [read_specimen(path) for path in args.specimens]
-    with protected_inputs(args.specimens):
-        for state in states:
-            report = export_landmarks(
-                state,
-                args.output,
-                formats=tuple(args.format or (".mrk.json",)),
-                overwrite=args.replace,
-                suggested=args.suggested,
-            )
-            sys.stdout.write(f"{report.text}\n")
-            if args.measurements and state.measurements:
-                files = export_measurements(state, args.output, overwrite=args.replace)
-                sys.stdout.write(f"Wrote {', '.join(file.name for file in files)}.\n")
+    with protected_inputs(args.specimens), all_or_none():
+        lines = [line for state in states for line in _exported(state, args)]
+    sys.stdout.writelines(f"{line}\n" for line in lines)
     return 0
+
+
+def _exported(state: SpecimenState, args: argparse.Namespace) -> Iterator[str]:
+    """Write the files of a specimen, and yield what was written and what is missing."""
+    from gp_labeler.document.landmark_export import export_landmarks
+    from gp_labeler.document.measurement_export import export_measurements
+
+    report = export_landmarks(
+        state,
+        args.output,
+        formats=tuple(args.format or (".mrk.json",)),
+        overwrite=args.replace,
+        suggested=args.suggested,
+    )
+    yield report.text
+    if args.measurements and state.measurements:
+        files = export_measurements(state, args.output, overwrite=args.replace)
+        yield f"Wrote {', '.join(file.name for file in files)}."

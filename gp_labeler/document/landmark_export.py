@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gp_core.disk import make_room
+from gp_core.disk import all_or_none, make_room
 from gp_core.errors import GpError
 from gp_core.io import landmark_file_name, write_csv, write_fcsv, write_markups, write_suggestions
 from gp_core.landmarks.features import CODES, Side, feature
@@ -142,8 +142,9 @@ def export_landmarks(
     if not files:
         raise _nothing_placed(state)
     make_room(folder, files, overwrite=overwrite)
-    for path, (write, side, labelling) in files.items():
-        write(path, labelling.described_side(side), labelling)
+    with all_or_none():
+        for path, (write, side, labelling) in files.items():
+            write(path, labelling.described_side(side), labelling)
     sides = [side for side in Side if _is_labelled(state, side)]
     return ExportReport(
         tuple(files),

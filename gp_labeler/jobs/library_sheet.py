@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gp_core.disk import all_or_none
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.labels import parse_label
@@ -106,12 +107,13 @@ def draw_library_check(
         return ()
     together = where.suffix.lower() == ".pdf"
     files = [where] if together else [where / library_sheet_name(scan.name) for scan in wrong]
-    for n, file in enumerate(files):
-        with pdf_file(file) as pages:
-            for scan in wrong if together else [wrong[n]]:
-                tell(scan.name)
-                for page in _pages(scan, check.of(scan.name), predictions[scan.name]):
-                    pages.savefig(page)  # type: ignore[no-untyped-call]
+    with all_or_none():
+        for n, file in enumerate(files):
+            with pdf_file(file) as pages:
+                for scan in wrong if together else [wrong[n]]:
+                    tell(scan.name)
+                    for page in _pages(scan, check.of(scan.name), predictions[scan.name]):
+                        pages.savefig(page)  # type: ignore[no-untyped-call]
     return tuple(files)
 
 

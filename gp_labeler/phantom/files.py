@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gp_core.disk import FREE_SPACE, atomic_file, write_text
+from gp_core.disk import FREE_SPACE, all_or_none, atomic_file, write_text
 from gp_core.errors import GpError
 from gp_core.io.markups import write_markups
 from gp_core.landmarks.features import Side
@@ -72,16 +72,15 @@ def save_phantom(phantom: Phantom, path: str | PathLike[str], *, labelled: bool 
         scan.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise GpError(f"cannot be made ({error.strerror})", file=scan.parent) from None
-    _write_volume(phantom.volume, scan)
-    about = _about(phantom.volume, scan)
     truth = scan.with_name(f"{name}.truth.json")
-    write_text(truth, json.dumps(_truth(phantom, about), indent=1) + "\n")
-    if not labelled:
-        return scan, truth
-    left, right = (scan.with_name(f"{name}_{side.value}.mrk.json") for side in Side)
-    for side, file in ((Side.LEFT, left), (Side.RIGHT, right)):
-        write_markups(file, phantom.specimen.side(side), specimen=name, volume=about)
-    return scan, truth, left, right
+    about = _about(phantom.volume, scan)
+    landmarks = {scan.with_name(f"{name}_{side.value}.mrk.json"): side for side in Side if labelled}
+    with all_or_none():
+        _write_volume(phantom.volume, scan)
+        write_text(truth, json.dumps(_truth(phantom, about), indent=1) + "\n")
+        for file, side in landmarks.items():
+            write_markups(file, phantom.specimen.side(side), specimen=name, volume=about)
+    return scan, truth, *landmarks
 
 
 def scan_name(path: Path) -> str:
