@@ -47,7 +47,8 @@ STATUS_WORDS: Mapping[str, Status] = {
 _SUGGESTED = re.compile(
     r"suggested, not confirmed"
     r"(?: \((?P<source>.*?)(?:; 95 % within (?P<radius>[0-9]{1,6}\.?[0-9]*) mm)?"
-    r"(?:; (?P<atlas>[0-9]{1,6}\.?[0-9]*) mm from where the atlas expects it)?\)(?=\.|$))?",
+    r"(?:; (?P<atlas>[0-9]{1,6}\.?[0-9]*) mm from where the atlas expects it)?"
+    r"(?P<doubtful>; doubtful)?\)(?=\.|$))?",
     re.IGNORECASE,
 )
 
@@ -230,7 +231,8 @@ def as_suggested(point: LabelledPoint, source: str = "") -> LabelledPoint:
     away = float(said["atlas"]) if said and said["atlas"] else 0.0
     x, y, z = point.position.tolist()
     origin = (said["source"] if said else "") or source
-    suggestion = Suggestion((x, y, z), radius or None, origin, away or None)
+    doubtful = bool(said and said["doubtful"])
+    suggestion = Suggestion((x, y, z), radius or None, origin, away or None, doubtful)
     return point._replace(position=None, status=Status.SUGGESTED, suggestion=suggestion)
 
 
@@ -292,7 +294,7 @@ def suggested_description(suggestion: Suggestion, about: str = "") -> str:
     Parameters
     ----------
     suggestion : Suggestion
-        Its source, its radius, and how far the atlas disagrees are told.
+        Its source, its radius, how far the atlas disagrees, and whether it is doubtful are told.
     about : str
         What else the description says.
 
@@ -304,7 +306,9 @@ def suggested_description(suggestion: Suggestion, about: str = "") -> str:
     radius = "" if suggestion.radius_95 is None else f"; 95 % within {suggestion.radius_95:.3f} mm"
     away = suggestion.atlas_distance
     atlas = "" if away is None else f"; {away:.3f} mm from where the atlas expects it"
-    origin = f" ({suggestion.source}{radius}{atlas})" if suggestion.source or radius or atlas else ""
+    doubtful = "; doubtful" if suggestion.doubtful else ""
+    said = f"{suggestion.source}{radius}{atlas}{doubtful}"
+    origin = f" ({said})" if said else ""
     return f"Suggested, not confirmed{origin}. {about}".rstrip()
 
 

@@ -28,6 +28,8 @@ class Suggestion:
         What suggests it: ``atlas``, ``mirror``, the name of a program, ...
     atlas_distance : float, optional
         Distance in mm from where the atlas expects it; None where the atlas does not disagree.
+    doubtful : bool
+        Whether what suggests it says that it needs a closer look than the others.
 
     Raises
     ------
@@ -39,6 +41,7 @@ class Suggestion:
     radius_95: float | None = None
     source: str = ""
     atlas_distance: float | None = None
+    doubtful: bool = False
 
     def __post_init__(self) -> None:
         try:
@@ -56,6 +59,7 @@ class Suggestion:
         if self.atlas_distance is not None:
             distance = _positive(self.atlas_distance, "distance from the atlas")
             object.__setattr__(self, "atlas_distance", distance)
+        object.__setattr__(self, "doubtful", bool(self.doubtful))
 
     @property
     def uncertainty(self) -> tuple[float, float]:

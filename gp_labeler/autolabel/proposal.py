@@ -117,7 +117,7 @@ class Proposal:
     def suggestion(self, guess: Guess) -> Suggestion:
         """Return a guess as a suggestion for a person to confirm."""
         x, y, z = guess.position.tolist()
-        return Suggestion((x, y, z), guess.radius_95, self.source, guess.atlas_distance)
+        return Suggestion((x, y, z), guess.radius_95, self.source, guess.atlas_distance, guess.is_doubtful)
 
     def suggestions(self) -> dict[Side, dict[str, Suggestion]]:
         """Return the guesses of the guinea pig's features by side and code, the most doubtful first."""

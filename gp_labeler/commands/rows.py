@@ -356,6 +356,9 @@ def landmark_rows() -> Iterator[Action]:
     yield row("point.suggest_like", "Suggest from my scans…", (), IN_WINDOW,
               lambda w: w.scan.volume is not None, checked=lambda w: w.first_labels.is_running,
               hint="Suggests first labels from labelled scans; choose it again to stop")
+    yield row("point.check_page", "Check suggestions in pages…", ("Ctrl+K",), IN_WINDOW,
+              lambda w: w.pages.can_begin,
+              hint="Close views of nine suggestions at a time; doubtful ones come up in the views afterwards")
     yield row("point.place", "Place at the crosshair", ("Space",), _place_at_crosshair, _can_place,
               icon="label", hint="As a click at the crosshair: a landmark, the end of a ruler, or a touch")
     yield row("point.replace", "Re-place with the next click", ("Shift+P",),

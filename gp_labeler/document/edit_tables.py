@@ -40,6 +40,7 @@ from gp_labeler.document.measurement_edits import (
     RemoveMeasurements,
     RenameMeasurement,
 )
+from gp_labeler.document.page_confirmation import ConfirmPage
 from gp_labeler.document.specimen_edits import RenameSpecimen, SetNotes, SetThreshold
 from gp_labeler.document.state import How, Provenance
 from gp_labeler.document.touch_edits import (
@@ -65,7 +66,7 @@ EDITS: Mapping[str, type[Any]] = MappingProxyType(
         kind.do: kind
         for kind in (
             *(PlacePoint, SuggestPoints, ConfirmPoint, ClearPoint, MarkUnseen, CheckPoint, LockPoints),
-            *(AnnotatePoint, BeginLabelling, OpenLabelling, NameObserver),
+            *(ConfirmPage, AnnotatePoint, BeginLabelling, OpenLabelling, NameObserver),
             *(SwapPoints, SwapSides, SetThreshold, SetNotes, RenameSpecimen),
             *(RecordTouch, TakeTouches, RemoveTouches, LeaveOutTouch, SwapTouches, MoveTouches, SetSkull),
             *(SetHeadFrame, ClearHeadFrame, ConfirmLeft),

@@ -217,6 +217,8 @@ def _suggestion_out(suggestion: Suggestion) -> Document:
         out["radius_95_mm"] = suggestion.radius_95
     if suggestion.atlas_distance is not None:
         out["atlas_distance_mm"] = suggestion.atlas_distance
+    if suggestion.doubtful:
+        out["doubtful"] = True
     return out | ({"source": suggestion.source} if suggestion.source else {})
 
 
@@ -300,6 +302,7 @@ def _suggestion_in(document: Mapping[str, Any], where: str) -> Suggestion | None
         lengths[0],
         _typed(content.get("source", ""), str, f"{where}.source"),
         lengths[1],
+        _typed(content.get("doubtful", False), bool, f"{where}.doubtful"),
     )
 
 

@@ -62,6 +62,7 @@ class How(str, Enum):
     SLICE = "slice"
     GHOST = "accepted ghost"
     CONFIRMED = "confirmed suggestion"
+    PAGE = "confirmed from a page"
     NUDGED = "nudged suggestion"
     IMPORTED = "imported"
     TYPED = "typed"

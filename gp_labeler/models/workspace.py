@@ -36,6 +36,7 @@ from gp_labeler.models.reference_points import ReferencePointsModel
 from gp_labeler.models.reliability import ReliabilityModel
 from gp_labeler.models.scan import ScanModel
 from gp_labeler.models.specimen_list import SpecimenListModel
+from gp_labeler.models.suggestion_pages import SuggestionPagesModel
 from gp_labeler.models.tracker import TrackerModel
 from gp_labeler.models.view import ViewModel
 
@@ -88,6 +89,7 @@ class Workspace:
         self.first_labels = FirstLabelsModel(
             document, self.scan, self.labels, self.head, self.atlas, jobs, messages, directory
         )
+        self.pages = SuggestionPagesModel(document, self.view, self.scan, self.labels, jobs, messages)
         document.picture = self._thumbnail
         self.pose = PoseModel(document, self.atlas, self.view, jobs, messages)
         self.planes = AnatomicalPlanesModel(self.labels, self.pose, self.view)

@@ -9,7 +9,7 @@ from gp_labeler.scripting.step import Step
 from gp_labeler.scripting.steps.atlas import Check, Fit, Reliability, UseAtlas
 from gp_labeler.scripting.steps.expecting import Expect
 from gp_labeler.scripting.steps.files import AddMesh, Details, Export, Import, Reference, RemoveMesh, Save
-from gp_labeler.scripting.steps.first_labels import CheckLabelledScans, SuggestLike
+from gp_labeler.scripting.steps.first_labels import CheckLabelledScans, CheckPages, SuggestLike
 from gp_labeler.scripting.steps.head import StraightenHead, TurnHead
 from gp_labeler.scripting.steps.labellings import LabelAgain, Observer, OpenOther
 from gp_labeler.scripting.steps.looking import Act, Look, PressKey, Screenshot, Undo
@@ -35,6 +35,7 @@ _ALL: tuple[type[Step], ...] = (
         StraightenHead,
         TurnHead,
         SuggestLike,
+        CheckPages,
         CheckLabelledScans,
         Observer,
         LabelAgain,

@@ -1,4 +1,4 @@
-"""Steps on labelled scans: suggesting landmarks from them, and checking them against each other."""
+"""Steps on labelled scans: suggesting landmarks from them, checking these, and checking labelled scans."""
 
 from __future__ import annotations
 
@@ -6,12 +6,18 @@ import json
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from gp_core.disk import write_text
 from gp_core.errors import GpError
+from gp_core.landmarks.features import Side, feature
+from gp_labeler.models.suggestion_pages import PageEntry
+from gp_labeler.scripting.events import click, press_keys
 from gp_labeler.scripting.step import Step
 from gp_labeler.scripting.window_driver import WindowDriver
+from gp_labeler.views.panels.label.suggestion_page_dialog import SuggestionPageDialog
 
-__all__ = ["PATIENCE_SECONDS", "CheckLabelledScans", "SuggestLike"]
+__all__ = ["PATIENCE_SECONDS", "CheckLabelledScans", "CheckPages", "SuggestLike"]
 
 PATIENCE_SECONDS = 6 * 3600.0
 """The first time, every labelled scan is predicted from every other; a busy machine takes long for that."""
@@ -49,6 +55,61 @@ class SuggestLike(Step):
             raise GpError("suggest_like: nothing was suggested")
         proposal = model.proposal
         return f"{len(proposal.guesses)} suggested from {proposal.source}"
+
+
+@dataclass(frozen=True)
+class CheckPages(Step):
+    """Check suggestions in pages of close views, as a person does: click those to look at again, press Enter.
+
+    Parameters
+    ----------
+    look_at : text or texts
+        Points such as ``CA L`` that shall be looked at in the views, so that they stay suggestions.
+    within : float, optional
+        Points that lie farther than this from their true place in the phantom, mm, are looked at, too.
+    """
+
+    do: ClassVar[str] = "check_pages"
+    look_at: tuple[str, ...] = ()
+    within: float | None = None
+
+    def run(self, driver: WindowDriver) -> str:  # noqa: D102
+        pages, before = driver.workspace.pages, _n_suggested(driver)
+        if not driver.window.commands.run("point.check_page"):
+            raise GpError(driver.trouble(0) or "check_pages: nothing is suggested")
+        dialog = driver.window.findChild(SuggestionPageDialog)
+        wanted, n_pages = {_point(each) for each in self.look_at}, pages.n_pages
+        for _ in range(n_pages):
+            driver.wait_until_idle()
+            for tile in dialog.shown_tiles:
+                dialog.scroll.ensureWidgetVisible(tile)
+                driver.app.processEvents()
+                if self._is_wanted(driver, tile.entry, wanted):
+                    click(tile, tile.width() / 2, tile.height() / 2)
+            press_keys(dialog.tiles[0], "Return")
+        driver.wait_until_idle()
+        left = _n_suggested(driver)
+        return f"{before - left} confirmed on {n_pages} pages, {left} left"
+
+    def _is_wanted(self, driver: WindowDriver, entry: PageEntry, wanted: set[tuple[Side, str]]) -> bool:
+        """Whether a person wants to look at a suggestion that the page offers to confirm."""
+        if entry.suggestion is None or not entry.is_offered:
+            return False
+        if self.within is None or (entry.side, entry.code) in wanted:
+            return (entry.side, entry.code) in wanted
+        off = np.linalg.norm(np.array(entry.suggestion.position) - driver.truth(entry.side, entry.code))
+        return bool(off > self.within)
+
+
+def _n_suggested(driver: WindowDriver) -> int:
+    left, right = (driver.workspace.document.landmarks(side).suggested for side in Side)
+    return len(left) + sum(not feature(code).shared for code in right)
+
+
+def _point(text: str) -> tuple[Side, str]:
+    """Return the point that a text such as ``CA L`` names."""
+    code, _, side = text.partition(" ")
+    return Side.parse(side or "L"), feature(code).code
 
 
 @dataclass(frozen=True)

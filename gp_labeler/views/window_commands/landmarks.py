@@ -11,6 +11,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, feature
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.label.labellings_dialog import LabellingsDialog
+from gp_labeler.views.panels.label.suggestion_page_dialog import SuggestionPageDialog
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.window_commands.command import Asking, WindowCommand
 from gp_labeler.views.window_commands.view import ask_reopen_mirrored
@@ -52,6 +53,15 @@ def label_again(window: MainWindow) -> None:
         window.set_step("label")
     else:
         show_labellings(window)
+
+
+def check_in_pages(window: MainWindow) -> None:
+    """Show the suggestions in pages of close views."""
+    window.workspace.pages.begin()
+    dialog = window.findChild(SuggestionPageDialog) or SuggestionPageDialog(window.workspace, window)
+    dialog.show()
+    dialog.raise_()
+    dialog.activateWindow()
 
 
 def place_by_click(window: MainWindow) -> None:
@@ -119,6 +129,7 @@ LANDMARK_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
         "edit.swap": Asking(ask_swap),
         "tool.place": place_by_click,
         "point.suggest_like": Asking(ask_suggest_like),
+        "point.check_page": check_in_pages,
         "labelling.again": label_again,
         "labelling.show": show_labellings,
     }

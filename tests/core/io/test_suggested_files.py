@@ -51,10 +51,11 @@ def test_a_suggestion_is_no_position_in_a_landmark_file(tmp_path: Path, ending: 
 
 @pytest.mark.parametrize("source", ["5 labelled scans", ""])
 @pytest.mark.parametrize("radius", [0.412, None])
-def test_a_file_of_suggestions_tells_where_the_atlas_disagrees(
-    tmp_path: Path, source: str, radius: float | None
+@pytest.mark.parametrize(("away", "doubtful"), [(1.25, False), (1.25, True), (None, True)])
+def test_a_file_of_suggestions_tells_where_the_atlas_disagrees_and_what_is_doubtful(
+    tmp_path: Path, source: str, radius: float | None, away: float | None, doubtful: bool
 ) -> None:
-    said = Suggestion((1, 2, 3), radius, source, 1.25)
+    said = Suggestion((1, 2, 3), radius, source, away, doubtful)
     file = tmp_path / "GP1_L_suggested.mrk.json"
     write_suggestions(file, LandmarkSet.empty("L").with_suggestions({"RWP": said}), specimen="GP1")
     assert dict(read_landmarks(file).suggested) == {"RWP": said}

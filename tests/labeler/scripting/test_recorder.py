@@ -71,6 +71,7 @@ ACTION_STEPS = {
     "point.place": "place_point",
     **dict.fromkeys(("point.accept_ghost", "point.accept_all", "point.suggest_like"), "suggest_points"),
     "point.confirm": "confirm_point",
+    "point.check_page": "confirm_page",
     "point.unseen": "mark_unseen",
     "point.clear": "clear_point",
     "point.check": "check_point",

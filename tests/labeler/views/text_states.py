@@ -16,6 +16,7 @@ from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_core import PROBE, Side
 from gp_core.atlas.sampling import draw_animal
+from gp_core.landmarks.features import FEATURES
 from gp_labeler.document import touching
 from gp_labeler.document.landmark_export import export_landmarks
 from gp_labeler.document.touches import TouchHow
@@ -26,6 +27,7 @@ from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.panels.label.export_dialog import ExportDialog
 from gp_labeler.views.panels.label.labellings_dialog import LabellingsDialog
 from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.label.suggestion_page_dialog import SuggestionPageDialog
 from gp_labeler.views.panels.measure.dialog import MeasureDialog
 from gp_labeler.views.panels.pose.physical_dialog import PhysicalDialog
 from gp_labeler.views.panels.scan.import_dialog import ImportDialog
@@ -290,7 +292,24 @@ def _dialog_makers(window: MainWindow, folder: Path) -> dict[str, Callable[[], Q
         "measurements": lambda: MeasureDialog(workspace, window.commands.actions, window),
         "labellings": lambda: LabellingsDialog(workspace, window),
         "specimens": lambda: SpecimenListDialog(workspace, window.prompts, window),
+        "suggestions in pages": lambda: _pages_of_suggestions(window),  # the last: it suggests all there is
     }
+
+
+def _pages_of_suggestions(window: MainWindow) -> QWidget:
+    """The first page of suggestions, one of them marked."""
+    workspace = window.workspace
+    middle = workspace.scan.volume.extent.mean(axis=0)
+    for side in Side:
+        for n, row in enumerate(row for row in FEATURES if not row.computed):
+            if not workspace.document.state.landmark(side, row.code).decided:
+                at = middle + 0.1 * n
+                workspace.labels.suggest(at, radius_95=0.3 + 0.1 * n, source="x", side=side, code=row.code)
+    workspace.pages.begin()
+    dialog = SuggestionPageDialog(workspace, window)
+    offered = [entry for entry in workspace.pages.entries if entry.is_offered]
+    workspace.pages.mark(offered[0].side, offered[0].code)
+    return dialog
 
 
 def _stack(folder: Path) -> Path:

@@ -1,4 +1,4 @@
-"""The first offer of the step Label: suggestions from labelled scans, before anything is placed."""
+"""The first offer of the step Label: suggestions from labelled scans, then checking them in pages."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from gp_labeler.views.signals import follow
 __all__ = ["SuggestRow"]
 
 _OFFER, _STOP = "Suggest…", "Stop"
+_FEWEST_FOR_A_PAGE = 2
 
 
 class SuggestRow(QWidget):
-    """A button, shown while a scan has no label and no suggestion yet, and while suggestions are made.
+    """Two buttons: to suggest landmarks, while a scan has none; and to check several suggestions at a glance.
 
     Parameters
     ----------
     workspace : Workspace
         Whose labels it looks at.
     actions : mapping of str to QAction
-        What its button does.
+        What its buttons do.
     """
 
     def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
@@ -34,7 +35,8 @@ class SuggestRow(QWidget):
             _OFFER,
             "Suggests first labels from labelled scans; click again to stop",
         )
-        in_row(self.button, margins=(0, 0, 12, 0), of=self)
+        self.check = action_button(actions["point.check_page"], "Check pages…")
+        in_row(self.button, self.check, margins=(0, 0, 12, 0), of=self)
         document = workspace.document
         for signal in (document.reset, document.landmarks_changed, workspace.first_labels.changed):
             follow(self, signal, self.refresh)
@@ -42,9 +44,13 @@ class SuggestRow(QWidget):
         self.refresh()
 
     def refresh(self, *_: object) -> None:
-        """Show the offer, or hide it."""
+        """Show the offers, or hide them."""
         running = self._workspace.first_labels.is_running
         sides = [self._workspace.document.landmarks(side) for side in Side]
         is_new = not any(landmarks.placed or landmarks.suggested for landmarks in sides)
+        has_scan = self._workspace.scan.volume is not None
+        n_suggested = sum(len(landmarks.suggested) for landmarks in sides)
         self.button.setText(_STOP if running else _OFFER)
-        self.setVisible(running or (is_new and self._workspace.scan.volume is not None))
+        self.button.setVisible(running or (is_new and has_scan))
+        self.check.setVisible(has_scan and n_suggested >= _FEWEST_FOR_A_PAGE)
+        self.setVisible(not (self.button.isHidden() and self.check.isHidden()))

@@ -1,0 +1,143 @@
+"""The window in which suggestions are checked in pages of close views."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QAction, QKeySequence
+from qtpy.QtWidgets import QDialog, QGridLayout, QPushButton, QWidget
+
+from gp_labeler.models.suggestion_pages import PAGE_SIZE
+from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
+from gp_labeler.views.panels.label.close_view_tile import CloseViewTile
+from gp_labeler.views.panels.parts import open_at, scrolled, text_label
+from gp_labeler.views.signals import attempt, follow
+
+__all__ = ["SuggestionPageDialog"]
+
+_COLUMNS = 3
+
+
+class SuggestionPageDialog(QDialog):
+    """Shows one page of `SuggestionPagesModel` at a time; stays beside the main window.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Whose suggestions; its pages have begun.
+    """
+
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workspace, self._pages = workspace, workspace.pages
+        self.setWindowTitle("Check suggestions in pages")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.text = text_label(role="heading")
+        self.tiles = [self._tile() for _ in range(PAGE_SIZE)]
+        self.back = self._button("Back", partial(self._turn, -1), "Show the page before")
+        self.leave = self._button(
+            "Next, without confirming", partial(self._turn, 1), "Confirm nothing of this page"
+        )
+        self.confirm = self._button("Confirm and go on", self._confirm, "Enter")
+        self.confirm.setProperty("role", "primary")
+        self._lay_out()
+        self._listen()
+        self.refresh()
+        self.tiles[0].setFocus()
+        open_at(self, 1180, 740)
+
+    def refresh(self, *_: object) -> None:
+        """Show the page as it stands."""
+        entries = self._pages.entries
+        self.text.setText(self._pages.text)
+        for tile, entry in zip(self.tiles, entries, strict=False):
+            tile.show_entry(entry)
+        for n, tile in enumerate(self.tiles):
+            tile.setVisible(n < len(entries))
+        self.back.setEnabled(self._pages.number > 0)
+        n_offered = sum(entry.is_offered for entry in entries)
+        self.confirm.setText(f"Confirm {n_offered} and go on" if n_offered else "Go on")
+
+    @property
+    def shown_tiles(self) -> list[CloseViewTile]:
+        """The tiles of the suggestions that the page has."""
+        return self.tiles[: len(self._pages.entries)]
+
+    def done(self, code: int) -> None:
+        """Close; what is still suggested comes up in the views."""
+        self._pages.finish()
+        super().done(code)
+
+    def _tile(self) -> CloseViewTile:
+        tile = CloseViewTile()
+        tile.clicked.connect(partial(self._mark, tile))
+        tile.shown.connect(self._pages.take_shown)
+        return tile
+
+    def _button(self, words: str, run: object, hint: str) -> QPushButton:
+        button = QPushButton(words)
+        button.setToolTip(hint)
+        button.setAutoDefault(False)
+        button.clicked.connect(run)
+        return button
+
+    def _lay_out(self) -> None:
+        page, grid = QWidget(), QGridLayout()
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(8)
+        for n, tile in enumerate(self.tiles):
+            grid.addWidget(tile, n // _COLUMNS, n % _COLUMNS)
+        for column in range(_COLUMNS):
+            grid.setColumnStretch(column, 1)
+        page.setProperty("role", "panel")
+        page.setLayout(grid)
+        close = self._button("Close", self.reject, "What is left comes up in the views")
+        buttons = in_row(self.back, self.leave, STRETCH, close, self.confirm, margins=0)
+        explained, self.scroll = text_label(_EXPLAINED, "hint", wrap=True), scrolled(page)
+        in_column(
+            self.text, explained, wide(self.scroll), buttons, margins=(14, 10, 14, 12), spacing=8, of=self
+        )
+        self._enter((page, self.confirm))
+
+    def _enter(self, where: tuple[QWidget, ...]) -> None:
+        """Let Enter confirm the page; a key that is held down confirms no second one."""
+        confirm = QAction("Confirm the page", self)
+        confirm.setShortcuts([QKeySequence("Return"), QKeySequence("Enter")])
+        confirm.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        confirm.setAutoRepeat(False)
+        confirm.triggered.connect(self._confirm)
+        undo = QAction("Undo", self)
+        undo.setShortcut(QKeySequence("Ctrl+Z"))
+        undo.triggered.connect(self._undo)
+        self.addAction(undo)
+        for widget in where:
+            widget.addAction(confirm)
+
+    def _listen(self) -> None:
+        follow(self, self._pages.changed, self.refresh)
+        follow(self, self._pages.finished, self._on_finished)
+
+    def _on_finished(self) -> None:
+        if self.isVisible():
+            self.accept()
+
+    def _mark(self, tile: CloseViewTile, *_: object) -> None:
+        if tile.entry is not None:
+            self._pages.mark(tile.entry.side, tile.entry.code, tile.isChecked())
+
+    def _confirm(self, *_: object) -> None:
+        attempt(self._workspace, self._pages.confirm)
+
+    def _turn(self, step: int, *_: object) -> None:
+        self._pages.turn(step)
+
+    def _undo(self, *_: object) -> None:
+        attempt(self._workspace, self._pages.undo)
+
+
+_EXPLAINED = (
+    "Check the cross in both pictures. Click a close view that you want to look at again. Enter confirms the "
+    "others, except the doubtful ones (orange). Those and the marked ones come up in the views afterwards."
+)
