@@ -42,6 +42,7 @@ from gp_labeler.document.measurement_edits import (
     RenameMeasurement,
 )
 from gp_labeler.document.opening import new_specimen
+from gp_labeler.document.page_confirmation import ConfirmPage
 from gp_labeler.document.specimen_document import SpecimenDocument, utc_now
 from gp_labeler.document.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
 from gp_labeler.document.specimen_json import document_of
@@ -209,7 +210,11 @@ pose_checks = st.builds(
 
 
 suggestions = st.builds(
-    Suggestion, positions, st.none() | st.floats(1e-3, 1e3), st.sampled_from(("", "atlas", "mirror"))
+    Suggestion,
+    positions,
+    st.none() | st.floats(1e-3, 1e3),
+    st.sampled_from(("", "atlas", "mirror")),
+    doubtful=st.booleans(),
 )
 
 
@@ -253,6 +258,9 @@ edits = st.one_of(
     st.builds(PlacePoint, sides, few_codes, positions, provenances, st.just("nudge")),
     st.builds(SuggestPoints, sides, st.dictionaries(few_codes, suggestions, max_size=3), provenances),
     st.builds(ConfirmPoint, sides, few_codes, provenances),
+    st.builds(
+        ConfirmPage, st.lists(st.tuples(sides, few_codes), min_size=1, max_size=3).map(tuple), provenances
+    ),
     st.builds(ClearPoint, sides, few_codes),
     st.builds(MarkUnseen, sides, few_codes, st.none() | provenances),
     st.builds(CheckPoint, sides, few_codes, st.booleans()),

@@ -17,6 +17,7 @@ from gp_labeler.document import (
     import_edit,
     labelling_edits,
     measurement_edits,
+    page_confirmation,
     specimen_edits,
     touch_edits,
 )
@@ -49,7 +50,7 @@ def test_every_kind_of_edit_has_a_name_of_its_own():
         kind
         for module in (
             *(edits_module, head_edits, labelling_edits, specimen_edits),
-            *(touch_edits, import_edit, measurement_edits),
+            *(touch_edits, import_edit, measurement_edits, page_confirmation),
         )
         for kind in vars(module).values()
         if isinstance(kind, type) and kind.__module__ == module.__name__ and "do" in vars(kind)
