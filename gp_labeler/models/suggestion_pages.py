@@ -75,7 +75,7 @@ class PageEntry:
         """Standard deviation of one coordinate, mm; None where the radius is not known."""
         if self.suggestion is None or self.suggestion.radius_95 is None:
             return None
-        return self.suggestion.radius_95 * _SD_PER_RADIUS
+        return float(self.suggestion.radius_95 * _SD_PER_RADIUS)
 
 
 class SuggestionPagesModel:

@@ -77,12 +77,12 @@ class CheckPages(Step):
         pages, before = driver.workspace.pages, _n_suggested(driver)
         if not driver.window.commands.run("point.check_page"):
             raise GpError(driver.trouble(0) or "check_pages: nothing is suggested")
-        dialog = driver.window.findChild(SuggestionPageDialog)
+        (dialog,) = driver.window.findChildren(SuggestionPageDialog)
         wanted, n_pages = {_point(each) for each in self.look_at}, pages.n_pages
         for _ in range(n_pages):
             driver.wait_until_idle()
             for tile in dialog.shown_tiles:
-                dialog.scroll.ensureWidgetVisible(tile)
+                dialog.area.ensureWidgetVisible(tile)
                 driver.app.processEvents()
                 if self._is_wanted(driver, tile.entry, wanted):
                     click(tile, tile.width() / 2, tile.height() / 2)
@@ -91,9 +91,11 @@ class CheckPages(Step):
         left = _n_suggested(driver)
         return f"{before - left} confirmed on {n_pages} pages, {left} left"
 
-    def _is_wanted(self, driver: WindowDriver, entry: PageEntry, wanted: set[tuple[Side, str]]) -> bool:
+    def _is_wanted(
+        self, driver: WindowDriver, entry: PageEntry | None, wanted: set[tuple[Side, str]]
+    ) -> bool:
         """Whether a person wants to look at a suggestion that the page offers to confirm."""
-        if entry.suggestion is None or not entry.is_offered:
+        if entry is None or entry.suggestion is None or not entry.is_offered:
             return False
         if self.within is None or (entry.side, entry.code) in wanted:
             return (entry.side, entry.code) in wanted

@@ -43,7 +43,7 @@ def show_all(qtbot, window, dialog) -> None:
     """Wait until the page is drawn, and look at all of it, scrolling where it does not fit."""
     wait_until_idle(qtbot, window)
     for tile in dialog.shown_tiles:
-        dialog.scroll.ensureWidgetVisible(tile)
+        dialog.area.ensureWidgetVisible(tile)
         qtbot.wait(10)
 
 

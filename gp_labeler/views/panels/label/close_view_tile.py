@@ -116,7 +116,8 @@ class CloseViewTile(QAbstractButton):
         self.how_sure, self.pictures = text_label(role="hint"), _ClosePictures()
         self.pictures.drawn.connect(lambda: self.shown.emit(self.entry))
         top = in_row(wide(self.heading), self.how_sure, margins=0)
-        in_column(top, self.state, wide(self.pictures), margins=(8, 5, 8, 8), spacing=3, of=self)
+        parts = (top, self.state, wide(self.pictures))
+        self._column = in_column(*parts, margins=(8, 5, 8, 8), spacing=3, of=self)
         for part in (self.heading, self.state, self.how_sure):
             part.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
@@ -140,10 +141,10 @@ class CloseViewTile(QAbstractButton):
         self.update()
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return self.layout().sizeHint()
+        return self._column.sizeHint()
 
     def minimumSizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return self.layout().minimumSize()
+        return self._column.minimumSize()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102, N802 - Qt's name
         theme = theme_of(self)

@@ -95,9 +95,9 @@ class SuggestionPageDialog(QDialog):
         page.setLayout(grid)
         close = self._button("Close", self.reject, "What is left comes up in the views")
         buttons = in_row(self.back, self.leave, STRETCH, close, self.confirm, margins=0)
-        explained, self.scroll = text_label(_EXPLAINED, "hint", wrap=True), scrolled(page)
+        explained, self.area = text_label(_EXPLAINED, "hint", wrap=True), scrolled(page)
         in_column(
-            self.text, explained, wide(self.scroll), buttons, margins=(14, 10, 14, 12), spacing=8, of=self
+            self.text, explained, wide(self.area), buttons, margins=(14, 10, 14, 12), spacing=8, of=self
         )
         self._enter((page, self.confirm))
 
