@@ -145,15 +145,13 @@ def test_undo_brings_the_page_back_as_a_whole(shared, pages) -> None:
     assert [(entry.side, entry.code, entry.suggestion) for entry in pages.entries] == before
 
 
-def test_a_close_view_shows_the_grey_values_around_its_place(shared, pages) -> None:
-    volume = shared[0].scan.volume
-    entry = next(entry for entry in pages.entries if entry.code == "IN")  # two slices, no bone
-    low, high = volume.intensity_range
-    k, j, i = np.rint(volume.scan_to_voxel(np.array([entry.suggestion.position]))[0]).astype(int)[::-1]
-    expected = 255 * np.clip((volume.array[k, j, i] - low) / (high - low), 0, 1)
-    for picture in entry.close_view.pictures:
-        middle = picture.shape[0] // 2
-        assert picture[middle, middle, 0] == pytest.approx(expected, abs=25)
+def test_a_close_view_shows_the_grey_values_around_its_place(pages) -> None:
+    """The ball is hollow where the points are, and bone where the pictures end, 4 mm beside them."""
+    for entry in pages.entries:
+        grey = entry.close_view.pictures[0][..., 0]
+        middle = grey.shape[0] // 2
+        assert grey[middle, middle] < 50
+        assert min(grey[middle, 0], grey[middle, -1], grey[0, middle], grey[-1, middle]) > 200
 
 
 def test_another_specimen_ends_the_pages_and_nothing_is_there_to_begin(shared) -> None:
