@@ -183,7 +183,7 @@ class SuggestionPagesModel:
     def mark(self, side: Side, code: str, on: bool = True) -> None:
         """Take down that a person wants to look at a suggestion in the views, or no more."""
         point = Active(side, code)
-        if (point in self._marked) is not on:
+        if self._entry(point).suggestion is not None and (point in self._marked) is not on:
             self._marked ^= {point}
             self.changed.emit()
 

@@ -32,9 +32,10 @@ def dialog(qtbot, window):
     }
     workspace = window.workspace
     workspace.document.do(SuggestPoints(L, found, workspace.document.provenance(How.GHOST)))
-    window.findChild(SuggestRow).check.click()
-    dialog = window.findChild(SuggestionPageDialog)
-    qtbot.waitExposed(dialog)
+    check = window.findChild(SuggestRow).check
+    qtbot.waitUntil(check.isEnabled)
+    QTest.mouseClick(check, LEFT)
+    (dialog,) = window.findChildren(SuggestionPageDialog)
     show_all(qtbot, window, dialog)
     return dialog
 

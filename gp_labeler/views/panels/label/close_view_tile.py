@@ -125,8 +125,7 @@ class CloseViewTile(QAbstractButton):
         """Show a suggestion as it stands."""
         self.entry = entry
         suggestion, row = entry.suggestion, feature(entry.code)
-        self.setChecked(entry.is_marked)
-        self.setEnabled(suggestion is not None)
+        self.setChecked(entry.is_marked and suggestion is not None)
         self.heading.setText(entry.name)
         self.heading.setToolTip(row.name)
         words, role = _state_words(entry)

@@ -126,6 +126,7 @@ class SuggestionPageDialog(QDialog):
     def _mark(self, tile: CloseViewTile, *_: object) -> None:
         if tile.entry is not None:
             self._pages.mark(tile.entry.side, tile.entry.code, tile.isChecked())
+            tile.show_entry(tile.entry)  # what is decided stays unmarked
 
     def _confirm(self, *_: object) -> None:
         attempt(self._workspace, self._pages.confirm)
