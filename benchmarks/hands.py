@@ -41,7 +41,9 @@ Step = Callable[[int], None]
 
 def crosshair(window: MainWindow) -> Step:
     """Drag the crosshair: three slices and the mark in the 3D view follow."""
-    view, middle = window.workspace.view, window.workspace.view.crosshair.copy()
+    view, volume = window.workspace.view, window.workspace.scan.volume
+    assert volume is not None
+    middle = volume.extent.mean(axis=0)
     return lambda n: view.set_crosshair(middle + 1.5 * np.array([np.sin(n / 5), np.cos(n / 7), n / 60]))
 
 

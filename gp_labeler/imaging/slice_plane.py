@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,7 +58,7 @@ class SlicePlane:
         if axes.shape != (3, 3) or not np.abs(axes.T @ axes - np.eye(3)).max() < 1e-6:
             raise GeometryError("right, down and normal of a slice plane must be orthogonal unit vectors")
 
-    @property
+    @cached_property
     def axes(self) -> FloatArray:
         """(3, 3) columns: right, down and normal."""
         return np.stack([self.right, self.down, self.normal], axis=-1)
@@ -70,7 +71,8 @@ class SlicePlane:
     def flat(self, points: ArrayLike) -> FloatArray:
         """Return the (N, 2) coordinates right and down, mm, of (N, 3) scan positions."""
         scan = as_points(points, "points", missing_allowed=True) - self.origin
-        return np.stack([scan @ self.right, scan @ self.down], axis=1)
+        flat: FloatArray = scan @ self.axes[:, :2]
+        return flat
 
     def depth(self, points: ArrayLike) -> FloatArray:
         """Return the (N,) coordinates across the slices, mm, of (N, 3) scan positions."""

@@ -27,8 +27,9 @@ _JOINED = np.array(
 _SADDLES = {0b0101: 16, 0b1010: 17}
 """Where two corners that face each other lie above, each is cut off by a line, as by VTK's flying edges."""
 
-_ENDS = np.stack([_CORNERS[_JOINED], _CORNERS[(_JOINED + 1) % 4]], axis=1)
-"""(18, 2, 2, 2): row and column of the first and the second ends of these two edges."""
+_FROM = _CORNERS[_JOINED]
+_STEPS = _CORNERS[(_JOINED + 1) % 4] - _FROM
+"""(18, 2, 2): row and column of the first ends of these two edges, and the steps to the second ones."""
 
 
 def level_segments(values: NDArray[Any], level: float) -> FloatArray:
@@ -53,25 +54,33 @@ def level_segments(values: NDArray[Any], level: float) -> FloatArray:
     ----------
     Lorensen and Cline 1987, Marching cubes, doi:10.1145/37402.37422; here in two dimensions.
     """
-    cell, case = _cut_cells(values, level)
-    second = [(np.flatnonzero(case == saddle), line) for saddle, line in _SADDLES.items()]
-    cell = np.concatenate([cell, *(cell[where] for where, _ in second)])
-    case = np.concatenate([case, *(np.full(len(where), line) for where, line in second)])
-    start, end = np.moveaxis(_ENDS[case] + cell[:, None, None], 1, 0)
-    before, after = (values[at[..., 0], at[..., 1]].astype(np.float64) for at in (start, end))
-    finite = np.isfinite(before) & np.isfinite(after)
-    share = np.divide(level - before, after - before, where=finite, out=np.zeros_like(before))
-    points: FloatArray = start + share[..., None] * (end - start)
-    return points[finite.all(axis=1), :, ::-1]
+    width, flat = values.shape[1], np.ravel(values)
+    cell, case = _cut_cells(flat, width, level)
+    start = cell[:, None] + (_FROM @ [width, 1]).take(case, axis=0)
+    before = flat.take(start).astype(np.float64)
+    after = flat.take(start + (_STEPS @ [width, 1]).take(case, axis=0)).astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        share = (level - before) / (after - before)
+    points = _FROM[..., ::-1].astype(np.float64).take(case, axis=0)
+    points += np.stack(np.divmod(cell, width)[::-1], axis=1)[:, None]
+    points += _STEPS[..., ::-1].astype(np.float64).take(case, axis=0) * share[..., None]
+    if values.dtype.kind not in "iub":
+        points = points[(np.isfinite(before) & np.isfinite(after)).all(axis=1)]
+    return points
 
 
-def _cut_cells(values: NDArray[Any], level: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return (N, 2) row and column of the cells that the level passes through, and their case, (N,)."""
-    width = values.shape[1]
-    whole = values.dtype.kind in "iub"  # compared as they are, not as floats
-    above = np.ravel(values >= (math.ceil(level) if whole else level)).view(np.uint8)
+def _cut_cells(flat: NDArray[Any], width: int, level: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the numbers of the cells that the level passes through, (N,), and which lines cut them, (N,).
+
+    A cell has the number of its first corner among the values, which are given row by row.
+    """
+    whole = flat.dtype.kind in "iub"  # compared as they are, not as floats
+    above = (flat >= (math.ceil(level) if whole else level)).view(np.uint8)
     n = max(above.size - width - 1, 0)
     case = above[:n] + 2 * above[1 : n + 1] + 4 * above[width + 1 :] + 8 * above[width : width + n]
-    flat = np.flatnonzero((case > 0) & (case < 15))
-    flat = flat[flat % width < width - 1]  # else it has its right corners in the next row
-    return np.stack(np.divmod(flat, width), axis=1), case[flat].astype(np.intp)
+    cell = np.flatnonzero((case > 0) & (case < 15))
+    cell = cell[cell % width < width - 1]  # else it has its right corners in the next row
+    case = case[cell].astype(np.intp)
+    second = [(cell[case == saddle], line) for saddle, line in _SADDLES.items()]
+    lines = [case, *(np.full(len(cells), line) for cells, line in second)]
+    return np.concatenate([cell, *(cells for cells, _ in second)]), np.concatenate(lines)

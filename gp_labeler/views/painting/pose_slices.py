@@ -152,6 +152,8 @@ class SlicePen:
 
     def _near(self, places: Sequence[FloatArray] | FloatArray, reach: float = REACH_MM) -> Iterator[_Near]:
         """Yield those of the (3,) places that are drawn, the painter's opacity set for each."""
+        if not len(places):
+            return
         scan = np.asarray(places, dtype=np.float64).reshape(-1, 3)
         offs = np.abs(self._shown.off_slice(scan))
         near = np.flatnonzero(offs <= reach)
