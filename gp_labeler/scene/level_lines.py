@@ -61,7 +61,7 @@ def level_segments(values: NDArray[Any], level: float) -> FloatArray:
     after = flat.take(start + (_STEPS @ [width, 1]).take(case, axis=0)).astype(np.float64)
     with np.errstate(invalid="ignore"):
         share = (level - before) / (after - before)
-    points = _FROM[..., ::-1].astype(np.float64).take(case, axis=0)
+    points: FloatArray = _FROM[..., ::-1].astype(np.float64).take(case, axis=0)
     points += np.stack(np.divmod(cell, width)[::-1], axis=1)[:, None]
     points += _STEPS[..., ::-1].astype(np.float64).take(case, axis=0) * share[..., None]
     if values.dtype.kind not in "iub":

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+from vtkmodules.vtkCommonDataModel import vtkCellArray
 from vtkmodules.vtkIOGeometry import vtkSTLReader
 from vtkmodules.vtkIOPLY import vtkPLYReader
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
@@ -21,7 +22,7 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 from gp_core.errors import GeometryError, GpError
 from gp_labeler.imaging.progress import Cancelled
 from gp_labeler.imaging.readers import read_volume
-from gp_labeler.imaging.surface import Surface, box_around, extract_isosurface, overview_stride
+from gp_labeler.imaging.surface import METHODS, Surface, box_around, extract_isosurface, overview_stride
 from gp_labeler.imaging.triangle_search import TriangleSearch
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.vtk_arrays import to_numpy
@@ -282,6 +283,17 @@ def test_what_a_user_can_do_wrong_is_said(tmp_path: Path) -> None:
     with pytest.raises(GeometryError, match="empty"):
         empty.project([0, 0, 0])
     assert empty.pick([0, 0, 0], [1, 0, 0]) is None
+
+
+def test_a_contour_has_narrow_point_numbers_from_the_start_and_other_meshes_what_vtk_gives_them() -> None:
+    image = ball(np.eye(3)).to_pyvista()
+    image.set_active_scalars(image.array_names[0])
+    contour = METHODS["flying-edges"](image, 0.0)
+    assert contour.GetPolys().GetConnectivityArray().GetDataTypeSize() == 4
+    assert vtkCellArray().IsStorage64Bit()
+    with pytest.raises(TypeError):
+        METHODS["flying-edges"](image, "bone")  # type: ignore[arg-type]
+    assert vtkCellArray().IsStorage64Bit()
 
 
 def test_a_surface_is_let_go_with_its_search_structure() -> None:
