@@ -24,6 +24,9 @@ _OUTLIER_RMS_RATIO = 0.5
 """A point is an outlier if leaving it out halves the RMS. False-positive rate 0.3 % with 8 points."""
 
 _EXACT_MM = 1e-6
+_LARGEST_SCALE = (
+    2.5  # between the distances of the same points: touches are off by millimetres, units by tens
+)
 
 
 @checks_arguments
@@ -51,7 +54,8 @@ def register_fiducials(
     Raises
     ------
     GeometryError
-        Fewer than three names in common, or points on one line.
+        Fewer than three names in common, points on one line, or distances between the points that differ
+        in the two frames as if one were not in mm.
     GpError
         A position is not three finite numbers.
 
@@ -64,6 +68,7 @@ def register_fiducials(
     """
     names = _shared_names(touches, scan, dst=dst, src=src)
     pairs = _Pairs(names, _rows(touches, names, src), _rows(scan, names, dst), dst, src)
+    _check_scale(pairs)
     suspects = _suspects(pairs)
     kept = [i for i in range(len(names)) if i not in suspects]
     fit = pairs.fit(kept)
@@ -108,6 +113,27 @@ class _Pairs:
     def fit(self, kept: Sequence[int]) -> RigidFit:
         names = [self.names[i] for i in kept]
         return fit_rigid(self.touched[kept], self.targets[kept], names=names, dst=self.dst, src=self.src)
+
+
+def _check_scale(pairs: _Pairs) -> None:
+    """Raise `GeometryError` where most distances between the points differ by far in the two frames."""
+    touched, targets = _distances(pairs.touched), _distances(pairs.targets)
+    apart = (touched > _EXACT_MM) & (targets > _EXACT_MM)
+    scale = float(np.median(targets[apart] / touched[apart])) if apart.any() else 1.0
+    if not 1 / _LARGEST_SCALE < scale < _LARGEST_SCALE:
+        larger, smaller = (pairs.dst, pairs.src) if scale > 1 else (pairs.src, pairs.dst)
+        raise GeometryError(
+            f"the points of the {larger} are {max(scale, 1 / scale):.4g} times as far apart as those of the "
+            f"{smaller}",
+            remedy="Both must be in mm: check their units, and the names of the points.",
+        )
+
+
+def _distances(points: FloatArray) -> FloatArray:
+    """Return the distance of every pair of points."""
+    first, second = np.triu_indices(len(points), k=1)
+    distances: FloatArray = np.linalg.norm(points[first] - points[second], axis=1)
+    return distances
 
 
 def _suspects(pairs: _Pairs) -> list[int]:

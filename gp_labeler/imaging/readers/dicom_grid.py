@@ -143,7 +143,8 @@ def _doubled(ordered: Sequence[DicomSlice], same: NDArray[np.bool_]) -> list[Pro
     found = [one.name for one, doubled in zip(ordered, same, strict=True) if doubled]
     if not found:
         return []
-    text = f"{len(found)} slices lie where another one lies: {names(found)}"
+    slices_lie = "1 slice lies" if len(found) == 1 else f"{len(found)} slices lie"
+    text = f"{slices_lie} where another one lies: {names(found)}"
     remedy = "Remove one of each, or accept the first (--accept doubled)."
     return [Problem("doubled", text, remedy=remedy, resolved_by=("accept",))]
 
@@ -162,7 +163,8 @@ def _gap(kept: Sequence[DicomSlice], places: FloatArray, along: FloatArray, step
         for n in before.tolist()
     ]
     n_missing = int(places[-1]) + 1 - len(kept)
-    text = f"{n_missing} of its slices, {step:.4g} mm apart, are missing: {names(where, 3)}"
+    are = "is" if n_missing == 1 else "are"
+    text = f"{n_missing} of its slices, {step:.4g} mm apart, {are} missing: {names(where, 3)}"
     remedy = "Find the missing files, or accept copies of the neighbouring slices (--accept gap)."
     return Problem("gap", text, remedy=remedy, resolved_by=("accept",))
 

@@ -27,7 +27,8 @@ def loaded_dtype(dtype: DTypeLike) -> np.dtype[Any]:
     """
     stored = np.dtype(dtype)
     if stored.kind not in "biuf":
-        raise GpError(f"voxels must be integers or floats, got {stored}")
+        problem = f"its voxels must be integers or floats, got {stored}"
+        raise GpError(problem, remedy="Save the grey values only.")
     if stored.name in _KEPT:
         return stored.newbyteorder("=")
     return np.dtype(_WIDENED.get(stored.name, "float32"))

@@ -17,7 +17,7 @@ from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.grey import loaded_dtype, narrowing
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
-from gp_labeler.imaging.readers.problems import Problem, warning
+from gp_labeler.imaging.readers.problems import Problem, failing_as_volume_error, warning
 from gp_labeler.imaging.readers.source import RawSource, SliceSource, window
 from gp_labeler.imaging.readers.spacing import shown, spacing_problems
 
@@ -144,8 +144,9 @@ class ImportPlan:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Type of the voxels once loaded."""
-        return loaded_dtype(self.stored_dtype)
+        """Type of the voxels once loaded; raises `VolumeError` where they are no plain numbers."""
+        with failing_as_volume_error(self.path):
+            return loaded_dtype(self.stored_dtype)
 
     @property
     def loaded_size(self) -> tuple[int, int, int]:

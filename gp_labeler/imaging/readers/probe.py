@@ -38,24 +38,24 @@ from gp_labeler.imaging.readers.tiff import inspect_tiff, is_multi_page
 __all__ = ["READERS", "inspect_path"]
 
 _FEW_IMAGES = 20  # more than that are slices, and need not be opened to see it
-_HINTS = {
-    ".raw": "A raw file needs its header: give the MHD or NHDR file that belongs to it.",
-    ".vol": "Save it as TIFF stack, DICOM or MHD in the scanner's software.",
-    ".vff": "Save it as NRRD in 3D Slicer (extension SlicerRT) first.",
-    ".ome": "It is the description of an OME-TIFF: give a TIFF file that belongs to it.",
-    ".mnc": "Save it as NIfTI or NRRD first.",
-    ".mgz": "Save it as NIfTI or NRRD first.",
-    ".mgh": "Save it as NIfTI or NRRD first.",
-    ".vti": "Save it as NRRD or MHA first.",
-    ".gz": "Unpack it first.",
-    ".bz2": "Unpack it first.",
-    ".xz": "Unpack it first.",
-    ".zst": "Unpack it first.",
-    ".zip": "Unpack it first.",
-    ".npy": "This format has neither voxel size nor directions: save it as NRRD or MHA first.",
-    ".stl": "This is a mesh; give the scan it was made from.",
-    ".ply": "This is a mesh; give the scan it was made from.",
+_REMEDIES = {
+    "A raw file needs its header: give the MHD or NHDR file that belongs to it.": ".raw",
+    "Save it as TIFF stack, DICOM or MHD in the scanner's software.": ".vol .vgi .txm .txrm .xrm .tom .pcr",
+    "Save it as NRRD in 3D Slicer (extension SlicerRT) first.": ".vff",
+    "Save the scan in it as NRRD in 3D Slicer.": ".mrb .mrml",
+    "It is the description of an OME-TIFF: give a TIFF file that belongs to it.": ".ome",
+    "Save it as NIfTI or NRRD first.": ".mnc .mgz .mgh",
+    "Save it as NRRD or MHA first.": ".vti",
+    "Save it as NRRD or OME-TIFF in the program that it comes from, or in Fiji.": (
+        ".zarr .n5 .h5 .hdf5 .he5 .ims .am .czi .lif .lsm .nd2 .oib .oir .stk .dv .mrc .rec .ics .ids .inr"
+    ),
+    "Unpack it first.": ".gz .bz2 .xz .zst .zip .7z .rar .tar .tgz",
+    "This format has neither voxel size nor directions: save it as NRRD or MHA first.": ".npy .npz",
+    "This is a mesh; give the scan it was made from.": ".stl .ply .obj .vtp .glb .gltf",
 }
+_HINTS = {suffix: remedy for remedy, suffixes in _REMEDIES.items() for suffix in suffixes.split()}
+_ZARR = (".zgroup", ".zattrs", ".zarray", "zarr.json")
+"""Files that make a folder a Zarr store; its voxels lie in thousands of others."""
 
 
 def inspect_path(path: str | PathLike[str], options: ImportOptions, report: Report) -> ImportPlan:
@@ -64,6 +64,9 @@ def inspect_path(path: str | PathLike[str], options: ImportOptions, report: Repo
     if not where.exists():
         raise VolumeError("there is no such file or folder", file=where, remedy="Check the path.")
     with quiet(), failing_as_volume_error(where):
+        if (store := _zarr_of(where)) is not None:
+            problem = "it is a Zarr store, which is not read"
+            raise VolumeError(problem, file=store, remedy=_HINTS[".zarr"])
         if where.is_dir():
             return _inspect_folder(where, options, report)
         if not where.is_file():
@@ -77,8 +80,7 @@ def _inspect_file(path: Path, options: ImportOptions, report: Report) -> ImportP
     """Look into a file by the first reader that knows it."""
     reader = next((reader for reader in _readers() if reader.knows(path)), None)
     if reader is None:
-        hint = _HINTS.get(path.suffix.lower(), f"Readable are {READABLE}.")
-        raise VolumeError("its format is not known", file=path, remedy=hint)
+        raise VolumeError("its format is not known", file=path, remedy=_remedy([path]))
     return reader.inspect(path, options, report)
 
 
@@ -125,6 +127,19 @@ def _inspect_folder(folder: Path, options: ImportOptions, report: Report) -> Imp
     return _inspect_below(folder, files, options, report)
 
 
+def _remedy(files: Sequence[Path]) -> str:
+    """Return what to do about files that nobody reads: by the name of the first that is known."""
+    known = (_HINTS[file.suffix.lower()] for file in files if file.suffix.lower() in _HINTS)
+    return next(known, f"Readable are {READABLE}.")
+
+
+def _zarr_of(path: Path) -> Path | None:
+    """Return the Zarr store that a path names, or of which it names the description."""
+    folder = path if path.is_dir() else path.parent
+    is_meant = path.is_dir() or path.name in _ZARR
+    return folder if is_meant and any((folder / name).is_file() for name in _ZARR) else None
+
+
 def _several(
     folder: Path, volumes: Sequence[Path], dicom: Sequence[Path], slices: Sequence[Path]
 ) -> VolumeError:
@@ -142,6 +157,9 @@ def _several(
 
 def _inspect_below(folder: Path, files: Sequence[Path], options: ImportOptions, report: Report) -> ImportPlan:
     """Go into the only subfolder that holds anything, as DICOM exports nest them."""
+    if (store := next(filter(None, map(_zarr_of, _children(folder))), None)) is not None:
+        problem = f"it holds no scan, only {store.name}"
+        raise VolumeError(problem, file=folder, remedy=_HINTS[".zarr"])
     below = [
         sub
         for sub in _subfolders(folder)
@@ -155,7 +173,7 @@ def _inspect_below(folder: Path, files: Sequence[Path], options: ImportOptions, 
         text = f"the scans are in its folders {names(below, 12)}"
         raise VolumeError(text, file=folder, remedy="Give one of these folders.")
     holds = f"only {names(files)}" if files else "nothing"
-    raise VolumeError(f"it holds no scan, {holds}", file=folder, remedy=f"Readable are {READABLE}.")
+    raise VolumeError(f"it holds no scan, {holds}", file=folder, remedy=_remedy(files))
 
 
 def _dicom_below(folder: Path) -> list[Path]:
@@ -186,6 +204,10 @@ def _siblings(path: Path) -> list[Path]:
 
 def _files(folder: Path) -> list[Path]:
     return sorted(file for file in folder.iterdir() if file.is_file() and not file.name.startswith("."))
+
+
+def _children(folder: Path) -> list[Path]:
+    return sorted(sub for sub in folder.iterdir() if sub.is_dir())
 
 
 def _subfolders(folder: Path) -> list[Path]:

@@ -136,6 +136,20 @@ def test_what_makes_no_registration_is_refused() -> None:
             register_fiducials({**square, "S2": wrong}, square)  # type: ignore[dict-item]
 
 
+@pytest.mark.parametrize("factor", [1e-3, 0.1, 10.0, 25.4, 1e3])
+def test_points_of_another_unit_are_no_registration(factor: float) -> None:
+    scan, points, _ = _lists(8, 0.2, 5, 0.0)
+    found, targets = named(points), named(factor * scan)
+    larger = "scan" if factor > 1 else "tracker"
+    with pytest.raises(GeometryError, match=rf"points of the {larger} are .* times as far apart.*in mm"):
+        register_fiducials(found, targets)
+
+
+def test_one_touch_far_away_is_no_wrong_unit() -> None:
+    scan, points, _ = _lists(8, 0.2, 5, 400.0)
+    assert register_fiducials(named(points), named(scan)).suspects == ("S2",)
+
+
 def test_as_json() -> None:
     content = touched(6, 0.1, 0)[0].as_dict()
     assert content.keys() >= {"transform", "fre_mm", "fle_mm", "fle_95_mm", "residuals_mm", "suspect"}

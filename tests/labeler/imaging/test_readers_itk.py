@@ -477,6 +477,37 @@ def test_an_unknown_format_says_what_can_be_read(name: str, tmp_path: Path) -> N
         read_volume(tmp_path / name)
 
 
+PACKED, FROM_ITS_PROGRAM = "Unpack it first", "Save it as NRRD or OME-TIFF in the program that it comes from"
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [
+        *((f"head.{ending}", PACKED) for ending in ("zip", "7z", "rar", "tar", "nrrd.gz", "nii.bz2")),
+        *((f"head.{ending}", FROM_ITS_PROGRAM) for ending in ("h5", "ims", "am", "czi", "lif", "nd2", "MRC")),
+        ("head.txm", "in the scanner's software"),
+        ("head.mrb", "as NRRD in 3D Slicer"),
+    ],
+)
+def test_what_is_not_read_says_what_to_do_with_it(name: str, remedy: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b"something else altogether")
+    for path in (tmp_path / name, tmp_path):  # also where a folder holds nothing else
+        with pytest.raises(VolumeError, match=remedy):
+            read_volume(path)
+
+
+@pytest.mark.parametrize("description", [".zattrs", "zarr.json"])
+def test_a_zarr_store_is_no_folder_of_slices(description: str, tmp_path: Path) -> None:
+    store = tmp_path / "scans" / "head.ome.zarr"
+    (store / "0" / "0").mkdir(parents=True)
+    (store / description).write_text("{}")
+    (store / "0" / "0" / "7").write_bytes(bytes(300))
+    for path in (store, store / description, store.parent):
+        with pytest.raises(VolumeError, match=FROM_ITS_PROGRAM) as refused:
+            read_volume(path)
+        assert "zarr" in str(refused.value).lower()
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(VolumeError, match=r"gone.nii: there is no such file or folder"):
         read_volume(tmp_path / "gone.nii")

@@ -164,6 +164,12 @@ def test_colour_pages_become_luminance_or_a_channel(planar: str, tmp_path: Path)
     assert_same_values(path, halved, spacing=SPACING, channel=1)
 
 
+def test_complex_pages_are_refused_by_name(tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "a.tif", np.zeros((12, 20, 20), np.complex64), photometric="minisblack")
+    with pytest.raises(VolumeError, match=r"a\.tif: its voxels must be integers or floats.* Save the grey"):
+        read_volume(tmp_path / "a.tif", spacing=SPACING)
+
+
 def test_palette_pages_become_grey(tmp_path: Path) -> None:
     scan = cropped()
     ramp = np.stack([np.arange(256, dtype=np.uint16) * 257] * 3)
