@@ -276,7 +276,10 @@ def read_marker_poses(path: str | PathLike[str]) -> FloatArray:
     if len(rows) > 1 and len(rows[1][1]) == len(names) + 1 and rows[1][1][-1]:
         names = ["", *names]  # R's row names, whose column has no name
     found = _named_columns(names)
-    return _poses_by_name(rows[1:], found, path) if found is not None else _matrices(rows, path)
+    if found is None:
+        return _matrices(rows, path)
+    _check_one_tool(names, found, path)
+    return _poses_by_name(rows[1:], found, path)
 
 
 def _column_name(field: str) -> str:
@@ -309,10 +312,33 @@ def _named_columns(names: list[str]) -> _PoseColumns | None:
     return _PoseColumns(rotation, translation, state)
 
 
+def _check_one_tool(names: list[str], columns: _PoseColumns, file: str | PathLike[str]) -> None:
+    """Raise `FileFormatError` where columns of a pose are there twice, as NDI writes those of two tools."""
+    twice = [names[i] for i in (*columns.rotation, *columns.translation) if names.count(names[i]) > 1]
+    if twice:
+        raise FileFormatError(
+            f"holds poses of several tools: its columns {' '.join(twice)} are there {names.count(twice[0])} "
+            "times",
+            file=file,
+            remedy="Keep the columns of the probe's marker, and delete the others.",
+        )
+
+
+def _check_degrees(angles: FloatArray, file: str | PathLike[str]) -> None:
+    """Raise `FileFormatError` where all angles, (N, 3), may be radians, as of a rotation vector."""
+    if len(angles) > 0 and 0 < np.abs(angles).max() <= np.pi:
+        raise FileFormatError(
+            "all of its angles lie within 3.15: they seem to be radians, and must be degrees",
+            file=file,
+            remedy="Export degrees (Rz,Ry,Rx), or quaternions (qw,qx,qy,qz).",
+        )
+
+
 def _poses_by_name(
     rows: list[tuple[int, list[str]]], columns: _PoseColumns, file: str | PathLike[str]
 ) -> FloatArray:
     poses = np.full((len(rows), 4, 4), np.nan)
+    turns = []
     for pose, (number, fields) in zip(poses, rows, strict=True):
         if columns.state is not None and not _is_seen(_field(fields, columns.state)):
             continue
@@ -321,6 +347,9 @@ def _poses_by_name(
         if np.isfinite(turn).all() and np.isfinite(place).all() and turn.any() | (len(turn) == 3):
             pose[:] = np.eye(4)
             pose[:3, :3], pose[:3, 3] = _rotation(turn), place
+            turns.append(turn)
+    if len(columns.rotation) == 3:
+        _check_degrees(np.array(turns), file)
     return poses
 
 

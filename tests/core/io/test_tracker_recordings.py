@@ -218,6 +218,27 @@ def test_what_is_no_recording_is_refused(tmp_path, text) -> None:
         read_recording(file)
 
 
+def test_the_columns_of_two_tools_are_not_taken_for_one(tmp_path) -> None:
+    one = "Port 1,Frame,State,Q0,Qx,Qy,Qz,Tx,Ty,Tz"
+    rows = [[1, k, "OK", *_quaternion(p), *p[:3, 3]] for k, p in enumerate(_turning(12))]
+    both = [[*row, 2, k, "OK", 1, 0, 0, 0, 5, 6, 7] for k, row in enumerate(rows)]
+    assert len(read_recording(_table(tmp_path / "one.csv", one, rows)).poses) == 12
+    with pytest.raises(FileFormatError, match=r"poses of several tools: its columns q0 .* are there 2 times"):
+        read_recording(_table(tmp_path / "two.csv", f"{one},{one.replace('1', '2')}", both))
+
+
+def test_angles_that_may_be_radians_are_refused(tmp_path) -> None:
+    poses = _turning(12)
+    for name, turns in (
+        ("Rz,Ry,Rx", Rotation.from_matrix(poses[:, :3, :3]).as_euler("ZYX")),
+        ("rx,ry,rz", Rotation.from_matrix(poses[:, :3, :3]).as_rotvec()),
+    ):
+        rows = [[*turn, *pose[:3, 3]] for turn, pose in zip(turns, poses, strict=True)]
+        file = _table(tmp_path / "a.csv", f"{name},Tx,Ty,Tz", rows)
+        with pytest.raises(FileFormatError, match=r"seem to be radians.*Export degrees"):
+            read_recording(file)
+
+
 def _touching(places: np.ndarray, *, hertz: float = 30.0) -> Recording:
     """The tip goes from place to place, and rests a second at each."""
     rng = np.random.default_rng(0)
