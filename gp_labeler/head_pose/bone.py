@@ -44,6 +44,15 @@ _MOST_ISLANDS, _RIVAL_SHARE = 6, 0.2
 _APART_RADII = 0.8
 """Distance of two heads over both radii, at least."""
 
+_NORMAL_MEDIAN = 0.6745
+"""Median of what noise of standard deviation 1 differs from its mean by."""
+
+_NOISY, _BLUR_VOXELS = 0.05, 1.0
+"""Noise over the range of grey values above which a copy is smoothed, and by how much."""
+
+_RING_VOXELS = 8.0
+"""How far around a voxel its slice tells what it would be without a ring, or a wider shade."""
+
 _FEWEST_VOXELS = 500
 _TAILS_PERCENT = (0.5, 99.9)
 _SAMPLES = 500_000
@@ -67,11 +76,14 @@ class CoarseScan:
         From an index (i, j, k) to LPS mm; an index names the centre of its cube.
     measured : (nz, ny, nx) bool array, optional
         Where the scanner measured; None: everywhere.
+    is_noisy : bool
+        Whether noise was so strong that the grey values were smoothed.
     """
 
     grid: _Values
     T_scan_index: FloatArray
     measured: _Mask | None = None
+    is_noisy: bool = False
 
     @cached_property
     def T_index_scan(self) -> FloatArray:  # noqa: N802 - a transform keeps its name
@@ -130,7 +142,7 @@ def coarse_scan(volume: Volume, step: float, box: ArrayLike | None = None) -> Co
     ----------
     volume : Volume
     step : float
-        mm; along a longer edge of the voxels, the voxels stay as they are.
+        mm; along a longer edge of the voxels, the voxels stay as they are. Strong noise is smoothed.
     box : (2, 3) array_like, LPS mm, optional
 
     Raises
@@ -146,7 +158,32 @@ def coarse_scan(volume: Volume, step: float, box: ArrayLike | None = None) -> Co
     to_volume[:3, :3] = np.diag(factors)
     to_volume[:3, 3] = first + (factors - 1) / 2
     measured = None if volume.fill is None else _block_means(part != volume.fill, factors) > 0.5
-    return CoarseScan(_block_means(part, factors), volume.T_scan_voxel @ to_volume, measured)
+    grid = _block_means(part, factors)
+    is_noisy = _noise(grid) > _NOISY
+    grid = _without_noise(grid) if is_noisy else grid
+    return CoarseScan(grid, volume.T_scan_voxel @ to_volume, measured, is_noisy)
+
+
+def _without_noise(grid: _Values) -> _Values:
+    """Return grey values smoothed, without rings: what is alike in most slices, unlike what is around it."""
+    from scipy.ndimage import gaussian_filter
+
+    surroundings = gaussian_filter(grid, (0.0, _RING_VOXELS, _RING_VOXELS))
+    return gaussian_filter(grid - np.median(grid - surroundings, axis=0), _BLUR_VOXELS)
+
+
+def _noise(grid: _Values) -> float:
+    """Return the standard deviation of noise over the range of grey values.
+
+    It is taken from second differences along the noisiest axis, the median of those that are not 0: what is
+    constant, such as a fill, has none.
+    """
+    low, high = (float(v) for v in np.percentile(grid[::2, ::2, ::2], _TAILS_PERCENT))
+    if not low < high:
+        return 0.0
+    differences = [np.abs(np.diff(grid, 2, axis=axis)) for axis in range(3) if grid.shape[axis] > 2]
+    medians = [float(np.median(d[d > 0])) for d in differences if d.any()]
+    return max([*medians, 0.0]) / (_NORMAL_MEDIAN * float(np.sqrt(6.0)) * (high - low))
 
 
 def _index_range(volume: Volume, box: ArrayLike | None) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

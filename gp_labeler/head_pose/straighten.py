@@ -138,6 +138,10 @@ def _check_together(found: _Found, lying: InPlane, volume: Volume) -> None:
     unclear = [lying.margin < _THIN_MARGIN, not _dense_in_front(found.bone, lying)]
     if all(unclear):
         raise HeadPoseError(f"{_FAILED}: it does not show which way is front and up", file=volume.path)
+    if any(unclear) and found.bone.scan.is_noisy:
+        raise HeadPoseError(
+            f"{_FAILED}: in so much noise it is not clear which way is front and up", file=volume.path
+        )
     if any(unclear) and found.confidence.margin < _CLEAR[2]:
         raise HeadPoseError(
             f"{_FAILED}: it is nearly as symmetric in another plane, and the template does not decide",

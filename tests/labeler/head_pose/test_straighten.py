@@ -83,6 +83,25 @@ def test_flesh_that_is_as_symmetric_is_not_taken_for_bone():
     assert pose.warnings == ()
 
 
+def with_noise(volume, share, seed=0):
+    """Return a scan with noise as strong as a share of how much brighter bone is than flesh."""
+    noise = np.random.default_rng(seed).normal(0, share * 18_000, volume.array.shape)
+    return Volume((volume.array + noise).astype(np.float32), volume.T_scan_voxel)
+
+
+def test_a_head_amid_strong_rings_is_straightened():
+    phantom = head(21, USUAL, rings=3000.0, bone_density=0.6)
+    deg, mm, _ = errors(straighten(phantom.volume), phantom)
+    assert deg < 0.8
+    assert mm < 0.15
+
+
+def test_half_a_head_in_strong_noise_is_refused():
+    phantom = head(24, turn=(0.0, 0.0, 0.0), crop=(0.65, "L"))
+    with pytest.raises(HeadPoseError, match="could not be straightened"):
+        straighten(with_noise(phantom.volume, 1 / 3))
+
+
 def test_the_head_frame_is_left_posterior_superior():
     pose, specimen = found(), head(names=USUAL).specimen
     left, right = (pose.T_head_scan.apply(specimen.side(s).array(["ZL", "OI", "IN"])) for s in Side)
@@ -352,6 +371,18 @@ def test_cubes_of_a_long_voxel_are_means_at_the_right_place():
     at = scan.places(np.zeros((1, 3)))[0]
     np.testing.assert_allclose(at, volume.voxel_to_scan([[1.5, 0.5, 0.0]])[0])
     np.testing.assert_allclose(scan.sampled(scan.grid, at[None]), scan.grid[0, 0, 0])
+
+
+def test_what_has_little_noise_is_not_smoothed_and_rings_are_taken_out_of_the_rest():
+    z, y, x = np.indices((40, 60, 60)) - 29.5
+    ball = np.where(z**2 + y**2 + x**2 < 15**2, 1_000, 0).astype(np.float32)
+    rng = np.random.default_rng(0)
+    noisy = ball + rng.normal(0, 10, ball.shape).astype(np.float32)
+    np.testing.assert_array_equal(coarse_scan(Volume(noisy, np.eye(4)), 1.0).grid, noisy)
+    rings = rng.normal(0, 200, 60)[np.hypot(y, x)[0].astype(int)].astype(np.float32)
+    ringed = coarse_scan(Volume(ball + rings, np.eye(4)), 1.0).grid
+    without = abs(np.hypot(np.hypot(z, y), x) - 15) > 4  # the edge is smoothed
+    assert abs(ringed - ball)[without].std() < 0.3 * rings.std()
 
 
 @pytest.mark.skipif(not MICE.is_dir(), reason="the shared mice are not here")
