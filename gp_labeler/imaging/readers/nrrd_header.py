@@ -67,6 +67,8 @@ _TO_LPS = {
     "left-anterior-superior": (1, -1, 1),
     "las": (1, -1, 1),
 }
+_TIMED = {"lpst": "lps", "rast": "ras", "last": "las"}
+_IN_FOUR = re.compile(r"\([^(),]+,[^(),]+,[^(),]+,[^(),]+\)")
 _SYNONYMS = {"centers": "centerings"}
 _SPATIAL = ("domain", "space", "???", "none")
 _LISTS = ("list", "time")
@@ -87,7 +89,7 @@ def read_nrrd_header(path: Path, channel: int | None = None) -> Header:
         raise not_a("NRRD", path)
     end = re.search(rb"\r?\n\r?\n", head)
     text = decoded(head[: end.start() if end else len(head)])
-    fields = _with_one_spelling(text_fields(text, ":"))
+    fields = _without_time(_with_one_spelling(text_fields(text, ":")))
     layout, axes = _layout(fields)
     files = _files(path, text, fields, layout)
     header_bytes = (end.end() if end else len(head)) if files == [path] else 0
@@ -110,6 +112,31 @@ def read_nrrd_header(path: Path, channel: int | None = None) -> Header:
 def _with_one_spelling(fields: dict[str, str]) -> dict[str, str]:
     """Return the fields with the one name of those that Teem writes under another."""
     return {_SYNONYMS.get(name, name): value for name, value in fields.items()}
+
+
+def _without_time(fields: dict[str, str]) -> dict[str, str]:
+    """Return the fields of a space that has a time as those of the space alone."""
+    space = fields.get("space", "").lower()
+    bare = _TIMED.get(space, space.removesuffix("-time"))
+    if bare == space:
+        return fields
+    directions, origin = (fields.get(name, "") for name in ("spacedirections", "spaceorigin"))
+    axes = _IN_FOUR.sub(lambda found: _axis_in_space(found[0]), directions)
+    begin = _IN_FOUR.sub(lambda found: _first_three(found[0]), origin)
+    changed = {"spacedirections": axes, "spaceorigin": begin}
+    return fields | {"space": bare} | {name: text for name, text in changed.items() if text}
+
+
+def _axis_in_space(text: str) -> str:
+    """Return an axis in three numbers; ``none`` for that of the time, and one of both as it is."""
+    *place, time = numbers({"axis": text}, "axis", 4)
+    if not any(place):
+        return "none"
+    return text if time else _first_three(text)
+
+
+def _first_three(text: str) -> str:
+    return f"{text.rpartition(',')[0]})"
 
 
 def _layout(fields: dict[str, str]) -> tuple[Layout, list[str | None]]:
@@ -192,7 +219,7 @@ def _geometry(
     fields: dict[str, str], layout: Layout, axes: list[str | None]
 ) -> tuple[Geometry, tuple[str, ...]]:
     """Return where voxels lie: by directions in a space, or else by the spacing along each axis."""
-    flips = _TO_LPS.get(fields.get("space", "").lower().removesuffix("-time"))
+    flips = _TO_LPS.get(fields.get("space", "").lower())
     directions = [axes[axis] for axis in layout.space]
     if None in directions:
         return _by_spacings(fields, layout)

@@ -158,6 +158,22 @@ NRRDS: dict[str, Write] = {
         space_directions=" ".join(vector(axis * (1, 1, 0.1)) for axis in np.diag(SPACING)),
         space_origin=vector(ORIGIN * (1, 1, 0.1)),
     ),
+    **{
+        f"with time, {space}": attached(
+            np.stack([RAW, RAW // 3]).tobytes() if n > 1 else PLAIN,
+            'space units: "mm" "mm" "mm" "s"',
+            space=space,
+            dimension="4",
+            sizes=f"{SIZES} {n}",
+            space_directions=" ".join(vector([*axis * flips, 0]) for axis in np.diag(SPACING)) + " (0,0,0,2)",
+            space_origin=vector([*ORIGIN * flips, 5.0]),
+        )
+        for space, flips, n in (
+            ("left-posterior-superior-time", (1, 1, 1), 1),
+            ("RAST", (-1, -1, 1), 2),
+            ("LAST", (1, -1, 1), 1),
+        )
+    },
     "interleaved list, the first": attached(
         np.stack([RAW, RAW // 3], axis=-1).tobytes(),
         "kinds: list domain domain domain",
