@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import gc
 import os
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,7 +13,16 @@ import qtpy
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from pytestqt.qtbot import QtBot
-from window_cases import PATIENCE_MS, Answers, ball_volume, close, left_behind, wait_until_idle
+from window_cases import (
+    PATIENCE_MS,
+    Answers,
+    ball_volume,
+    close,
+    left_behind,
+    left_by_test,
+    top_level_widgets,
+    wait_until_idle,
+)
 
 from gp_labeler.imaging.volume import Volume
 
@@ -28,12 +37,40 @@ _DRAWN = ("views", "scene", "scripting")
 tests that do so ask for the application."""
 
 
+_BEFORE = pytest.StashKey[list[object]]()
+"""The windows that were there before a test."""
+
+
+@pytest.fixture(autouse=True)
+def _set_aside(request: pytest.FixtureRequest) -> None:
+    """Set aside from the collector what is there before a test: what is found afterwards is the test's own.
+
+    Looking for it takes milliseconds. It is done once the test is torn down: until then, pytest keeps the
+    frames of a fixture that skipped it.
+    """
+    if _is_checked(request.node):
+        request.node.stash[_BEFORE] = top_level_widgets()
+        gc.freeze()
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
-    """After the tests of a file, nothing that they showed or drew is alive: no widget, no scene of VTK."""
-    yield
+    """After a test, and after a file, nothing that it showed or drew is alive: no window, no scene of VTK.
+
+    A window of the whole file keeps what a test drew in it. Beside one, only other windows are looked for
+    after each test, and the rest at the end of the file.
+    """
+    try:
+        yield
+        getattr(item, "funcargs", {}).clear()  # pytest keeps what the test was given a little longer
+        if _BEFORE in item.stash and _is_checked(item):
+            left = left_by_test(item.stash[_BEFORE])
+            assert not left, "left behind by the test"
+    finally:
+        gc.unfreeze()
+        if _BEFORE in item.stash:
+            del item.stash[_BEFORE]
     if (nextitem is None or nextitem.path != item.path) and _is_checked(item):
-        getattr(item, "funcargs", {}).clear()  # pytest keeps what the last test was given a little longer
         left = left_behind()
         assert not left, f"left behind by the tests of {item.path.name}"
 
@@ -43,7 +80,7 @@ def _is_checked(item: pytest.Item) -> bool:
     usual = qtpy.PYSIDE6 and os.environ.get("GP_LABELER_CANVAS") != "native"
     any_failed = bool(item.session.testsfailed)  # its traceback keeps what it showed
     draws = item.path.parent.name in _DRAWN or "qapp" in getattr(item, "fixturenames", ())
-    return usual and not any_failed and draws and "qtpy.QtWidgets" in sys.modules
+    return usual and not any_failed and draws
 
 
 class PatientBot(QtBot):

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import gc
+import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
+from qtpy.QtCore import QCoreApplication, QEvent, QEventLoop, QTimer
 from qtpy.QtGui import QImage
+from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.views.prompts import Prompts
@@ -16,6 +19,9 @@ from gp_labeler.views.prompts import Prompts
 BALL_MM, VOXEL_MM = 6.0, 0.25
 PATIENCE_MS = 120_000
 """How long a test waits for what must come true: only a failure lasts that long, however busy the machine."""
+
+LET_GO_S = 10.0
+"""How long what a test showed may live on: only a leak lasts that long."""
 
 MIDDLE = np.array([10.0, -20.0, 30.0])
 
@@ -114,7 +120,6 @@ def drop_file(widget, path: Path, x: float = 9, y: float = 9, entered: Callable[
 def close(window) -> None:
     """Close a window and let Qt delete it."""
     from qtpy.compat import isalive
-    from qtpy.QtCore import QCoreApplication, QEvent
 
     if not isalive(window):
         return
@@ -126,27 +131,68 @@ def close(window) -> None:
 
 def left_behind() -> Counter[str]:
     """Count the widgets, and the actors, renderers and render windows of VTK, that are alive, by type."""
-    if _widgets_and_scenes():
-        gc.collect()  # a window and its parts know each other; collecting takes long, so only where need be
-    return _widgets_and_scenes()
+    return _never_let_go(lambda: _names(QApplication.allWidgets()) + _scenes())
 
 
-def _widgets_and_scenes() -> Counter[str]:
-    from qtpy.QtCore import QCoreApplication, QEvent
-    from qtpy.QtWidgets import QApplication
+def left_by_test(before: list[QWidget], patience_s: float = LET_GO_S) -> Counter[str]:
+    """Count the windows that were not there before, by type; where none was, the parts of scenes too."""
 
+    def alive() -> Counter[str]:
+        windows = _names(widget for widget in top_level_widgets() if widget not in before)
+        return windows if before else windows + _scenes()
+
+    return _never_let_go(alive, patience_s)
+
+
+def top_level_widgets() -> list[QWidget]:
+    """Return all windows, dialogs and menus that are alive, shown or not."""
+    return QApplication.topLevelWidgets()
+
+
+def _never_let_go(alive: Callable[[], Counter[str]], patience_s: float = LET_GO_S) -> Counter[str]:
+    """Count what is still alive once threads that end and events that wait have had time to let go of it."""
+    end = time.monotonic() + patience_s
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    left = alive()
+    while left:
+        gc.collect()  # windows and their parts know each other
+        one_turn()
+        left = alive()
+        if time.monotonic() > end:
+            break
+    return left
+
+
+def _names(things: Iterable[object]) -> Counter[str]:
+    return Counter(type(thing).__name__ for thing in things)
+
+
+def _scenes() -> Counter[str]:
     drawn = ("vtkRenderWindow", "vtkRenderer", "vtkProp")
     types = Counter(map(type, gc.get_objects()))
-    scenes = {t.__name__: n for t, n in types.items() if any(base.__name__ in drawn for base in t.__mro__)}
-    return Counter(type(widget).__name__ for widget in QApplication.allWidgets()) + Counter(scenes)
+    return Counter(
+        {t.__name__: n for t, n in types.items() if any(base.__name__ in drawn for base in t.__mro__)}
+    )
+
+
+def one_turn() -> None:
+    """Let Qt do all that is due: what was posted, timers that are over, and what both of these post."""
+    for _ in range(3):
+        let_run(0)
+
+
+def let_run(ms: int) -> None:
+    """Let the event loop run; `QTest.qWait` would keep Python's lock, and background work stand still."""
+    loop = QEventLoop()
+    QTimer.singleShot(ms, loop.quit)
+    loop.exec()
 
 
 def wait_until_idle(qtbot, window, seconds: float = PATIENCE_MS / 1000) -> None:
     """Wait until all work is done, and all is drawn."""
     workspace = window.workspace
     qtbot.waitUntil(lambda: not workspace.jobs.running, timeout=int(1000 * seconds))
-    qtbot.wait(10)
+    one_turn()
     view = window.grid.scene_view  # drawn in an event of its own, which a busy machine may put off
     qtbot.waitUntil(lambda: not (view.is_stale and view.isVisible()), timeout=int(1000 * seconds))
 

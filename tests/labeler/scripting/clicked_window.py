@@ -15,7 +15,7 @@ import numpy as np
 from qtpy.QtCore import QPoint, QPointF
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QWidget
-from window_cases import BALL_MM, MIDDLE, Answers, ball_volume, close
+from window_cases import BALL_MM, MIDDLE, Answers, ball_volume, close, let_run
 
 from gp_core.landmarks.features import Side
 from gp_labeler.views.application import make_application, make_window
@@ -25,16 +25,15 @@ ON_BONE = MIDDLE + BALL_MM * np.array([0.3, -0.9, 0.1]) / np.linalg.norm([0.3, -
 
 
 def xdotool(*words: object) -> None:
-    """Let the X server move the mouse or press keys, and let the window take it in."""
+    """Let the X server move the mouse or press keys; the window takes it in by and by, see `until`."""
     subprocess.run(["xdotool", *map(str, words)], check=True, timeout=120)
-    QTest.qWait(150)
 
 
 def until(true: Callable[[], bool]) -> None:
     """Wait for what a click or key brings about; where it never does, the test tells what there is."""
     end = time.monotonic() + 120
     while not true() and time.monotonic() < end:
-        QTest.qWait(10)
+        let_run(10)
 
 
 def point_at(widget: QWidget, pixel: tuple[float, float]) -> None:
@@ -50,12 +49,11 @@ def drive() -> dict[str, object]:
     window.move(QPoint(20, 20))
     window.show()
     window.workspace.scan.begin(ball_volume())
-    while window.workspace.jobs.running:
-        QTest.qWait(10)
+    until(lambda: not window.workspace.jobs.running)
     QTest.qWaitForWindowExposed(window)
     window.activateWindow()
-    QTest.qWait(200)
     scene, document = window.grid.scene_view, window.workspace.document
+    until(lambda: window.isActiveWindow() and scene.is_up_to_date)
     axial = next(view for plane, view in window.grid.slice_views.items() if plane.value == "axial")
     scene.view_from("A")
     window.workspace.view.set_crosshair(INSIDE)

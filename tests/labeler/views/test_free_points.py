@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from document_cases import head_frame
-from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, shown_pixels, wait_until_idle
+from window_cases import BALL_MM, MIDDLE, one_turn, shown_pixels, wait_until_idle
 
 from gp_labeler.document.head_edits import SetHeadFrame
 from gp_labeler.scene.planes import Plane
@@ -73,6 +72,6 @@ def test_the_card_has_room_for_what_it_says_while_the_head_is_turned_by_hand(qtb
 
     qtbot.waitUntil(lambda: card.isVisible() and fits())
     window.workspace.head.turn("pitch", 0.1)  # what it says is put in again
-    QTest.qWait(20)
-    qtbot.waitUntil(fits, timeout=5000)
+    one_turn()
+    qtbot.waitUntil(fits)
     window.commands.run("head.by_hand")

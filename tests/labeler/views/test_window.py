@@ -18,7 +18,7 @@ import pytest
 from qtpy.QtCore import Qt, QTimer
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QMenu
-from window_cases import MIDDLE, Answers, ball_volume, close, wait_until_idle
+from window_cases import MIDDLE, Answers, ball_volume, close, one_turn, wait_until_idle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.commands.actions import ACTIONS
@@ -164,12 +164,12 @@ from pathlib import Path
 from qtpy.QtCore import QPoint, Qt, QTimer
 from qtpy.QtTest import QTest
 from gp_labeler.views.application import make_application, make_window
-from window_cases import MIDDLE, ball_volume
+from window_cases import MIDDLE, PATIENCE_MS, ball_volume
 app = make_application()
 window = make_window(Path(sys.argv[1]), atlas=False)
 window.show()
 window.workspace.scan.begin(ball_volume())
-end = time.monotonic() + 30
+end = time.monotonic() + PATIENCE_MS / 1000
 while window.workspace.jobs.running and time.monotonic() < end:
     app.processEvents()
 view = window.grid.scene_view
@@ -407,7 +407,7 @@ def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) 
     def visit(*layouts: str) -> None:
         for layout in layouts:
             window.workspace.view.update(layout=layout)
-            qtbot.wait(30)
+            one_turn()
 
     whole = view.shown
     visit("axial")
