@@ -53,6 +53,9 @@ LOOKS = (
 )
 """Commands, or beginnings of their names, that change only what is seen: taken down as they are."""
 
+_OF_THE_ACTIVE_FEATURE = ("view.zoom_to_point", "view.cut_open", "view.plane_")
+"""Commands, or beginnings of their names, that a script must choose a feature for."""
+
 _VIEW_KEYS = {
     "layout": "layout",
     "mesh_opacity": "opacity",
@@ -251,9 +254,7 @@ class Recorder(QObject):
             self.tables.append(step("view", reset=self._window.grid.name_here))
         elif id == "view.go_to":
             self.tables.append(step("view", go_to=self._window.workspace.view.crosshair.tolist()))
-        elif id in ("view.zoom_to_point", "view.cut_open") or id.startswith(
-            "view.plane_"
-        ):  # of the active feature
+        elif id.startswith(_OF_THE_ACTIVE_FEATURE):
             active = self._window.workspace.labels.active
             if active.code is not None:
                 self.tables.append(step("choose", feature=active.code, side=active.side.value))

@@ -36,6 +36,11 @@ _MARGIN, _ROOM = 12, 8
 
 _WIDEST_PLACE = "L 00.00  P 00.00  S 00.00 mm  ·  voxel 0000, 0000, 0000  ·  -32768"
 _WIDEST_FRAME = "Head frame, turned"
+_TOOL_HINTS = {
+    "look": "Drag on a slice to move the crosshair",
+    "turn": "Drag on a slice to rotate the head about the crosshair · Esc ends this",
+    "grey": "Drag on a slice: left or right for contrast, up or down for brightness",
+}
 _SIGNS = {"info": "", "warning": "Warning: ", "error": "Error: "}
 _MESSAGE_MS = {"info": 5000, "warning": 12000, "error": 0}
 
@@ -135,36 +140,36 @@ class StatusLine(QWidget):
         self._say_next()
 
     def _say_next(self) -> None:
+        self._show(*self._next())
+
+    def _next(self) -> tuple[str, str]:
+        """Return what the next click does, or what comes next, and in which role it is shown."""
         workspace = self._workspace
         if workspace.interaction.drag is not None:
             point = point_text(workspace.interaction.drag.side, workspace.interaction.drag.code)
-            self._show(f"Release to place {point} here, or press Esc to cancel", "next")
-        elif workspace.scan.volume is None:
+            return f"Release to place {point} here, or press Esc to cancel", "next"
+        if workspace.scan.volume is None:
             its_own = "Locate the scan with File > Find scan" if workspace.document.volume_is_lost else ""
-            self._show(self.without_scan or its_own or "Open a scan, or try the demo", "hint")
-        elif workspace.interaction.replacing and workspace.labels.active.code is not None:
+            return self.without_scan or its_own or "Open a scan, or try the demo", "hint"
+        if workspace.interaction.replacing and workspace.labels.active.code is not None:
             point = point_text(workspace.labels.active.side, workspace.labels.active.code)
-            self._show(f"Click the new position of {point} · Esc cancels", "next")
-        elif workspace.measure.dragged is not None:
+            return f"Click the new position of {point} · Esc cancels", "next"
+        if workspace.measure.dragged is not None:
             name = workspace.measure.dragged[0]
-            self._show(f"Release to place the end of {name}, or press Esc to cancel", "next")
-        elif workspace.measure.kind is not None:
-            self._show(workspace.measure.click_text, "next")
-        elif workspace.interaction.tool == "touch":
-            target = workspace.pose.target
-            if target:
-                where = point_text(workspace.pose.side, target)
-                self._show(f"Click on bone or a slice where {where} is", "next")
-            else:
-                self._show("All features are touched", "next")
-        elif workspace.interaction.tool == "look":
-            self._show("Drag on a slice to move the crosshair", "hint")
-        elif workspace.interaction.tool == "turn":
-            self._show("Drag on a slice to rotate the head about the crosshair · Esc ends this", "hint")
-        elif workspace.interaction.tool == "grey":
-            self._show("Drag on a slice: left or right for contrast, up or down for brightness", "hint")
-        else:
-            self._show(workspace.labels.click_text, "next")
+            return f"Release to place the end of {name}, or press Esc to cancel", "next"
+        if workspace.measure.kind is not None:
+            return workspace.measure.click_text, "next"
+        if workspace.interaction.tool == "touch":
+            return self._touch_text(), "next"
+        if workspace.interaction.tool in _TOOL_HINTS:
+            return _TOOL_HINTS[workspace.interaction.tool], "hint"
+        return workspace.labels.click_text, "next"
+
+    def _touch_text(self) -> str:
+        pose = self._workspace.pose
+        if not pose.target:
+            return "All features are touched"
+        return f"Click on bone or a slice where {point_text(pose.side, pose.target)} is"
 
     def _show(self, text: str, role: str) -> None:
         self.next_click.setText(text)
