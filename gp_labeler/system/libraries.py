@@ -44,8 +44,8 @@ class Need:
         """Whether this machine has it."""
         if self.name == "fonts":
             return any(Path("/usr/share/fonts").rglob("*.[to]tf"))
-        if self.name.startswith("module "):
-            return importlib.util.find_spec(self.name.split()[1]) is not None
+        if self.name.startswith("module "):  # they set up environments, which a frozen program does not
+            return hasattr(sys, "frozen") or importlib.util.find_spec(self.name.split()[1]) is not None
         if ".so." not in self.name:
             return shutil.which(self.name) is not None
         try:

@@ -28,6 +28,7 @@ from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.panels.table import panel_at_fault
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import offer_recoveries
+from gp_labeler.views.screen_reader import describe_widgets
 from gp_labeler.views.state_question import directory_to_use
 from gp_labeler.views.window_commands.file import open_demo, open_path
 from gp_labeler.views.window_state import WindowState
@@ -83,6 +84,7 @@ def make_window(directory: Path | None = None, *, atlas: bool = True) -> MainWin
         Whether to load the atlas chosen last, else the published one, for ghosts.
     """
     make_application()
+    describe_widgets()
     importlib.import_module("scipy.ndimage")  # the scene needs it; no job may be importing SciPy meanwhile
     dispatcher = QtDispatcher()
     workspace = Workspace(directory, dispatcher)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from math import inf
 from pathlib import Path
 
 from qtpy.QtWidgets import QFileDialog, QInputDialog, QMessageBox, QWidget
@@ -104,6 +106,9 @@ class Prompts:
         return given if ok else None
 
     def number(self, title: str, text: str, value: float) -> float | None:
-        """Ask for a number above 0."""
-        given, ok = QInputDialog.getDouble(self._parent, title, text, value, 0.0001, 1000.0, 5)
-        return given if ok else None
+        """Ask for a number above 0, until one is given; None where the user thinks better of it."""
+        while (given := self.text(title, text, f"{value:g}")) is not None:
+            with suppress(ValueError):
+                if 0 < (number := float(given.replace(",", "."))) < inf:
+                    return number
+        return None

@@ -122,6 +122,7 @@ class Rail(QWidget):
     def _button(self, number: int, step: WorkStep) -> _RailButton:
         button = _RailButton(step.id, step.title, str(number), step.icon, self)
         button.setCheckable(True)
+        button.setAutoExclusive(True)  # screen readers call it a radio button
         button.setToolTip(step.hint)
         button.setAccessibleDescription(button.toolTip())
         button.clicked.connect(lambda: self.step_chosen.emit(step.id))

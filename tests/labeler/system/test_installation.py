@@ -250,6 +250,13 @@ def test_a_package_has_the_name_that_apt_knows(policy, package, tmp_path, monkey
     assert advice([GLIB]).endswith(f"apt-get install --no-install-recommends {package}")
 
 
+def test_a_frozen_program_needs_nothing_that_makes_environments(monkeypatch) -> None:
+    need = Need("module nonesuch", ("python3-nonesuch",), "")
+    assert not need.is_there()
+    monkeypatch.setattr(sys, "frozen", True, raising=False)
+    assert need.is_there()
+
+
 def test_where_there_is_no_apt_the_libraries_are_named(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     assert advice([GLIB]) == "install what brings libnonesuch.so.0"

@@ -61,9 +61,6 @@ _SCALE = 3
 """How much larger words are drawn to see their colour: at their own size most pixels are half covered."""
 
 _NO_ROLES = ("", "NoRole", "Client", "Window")
-_PAINTED = ("HistogramSlider", "SceneView", "SliceView", "Scrolled")
-"""Pictures, and an area that scrolls: Qt has no role for what is painted, and theirs are told by the name."""
-
 _CARET = 120
 """Pixels, more than the caret of a field has: so many at least make a focus visible."""
 
@@ -289,7 +286,7 @@ class Walk:
             name = spoken(widget)
             if sum(map(str.isalnum, name)) < 2:
                 self.found["names"].add(f"{state}: {type(widget).__name__} {name!r}")
-            if role_of(widget) in _NO_ROLES and type(widget).__name__ not in _PAINTED:
+            if role_of(widget) in _NO_ROLES:
                 self.found["roles"].add(f"{state}: {type(widget).__name__}")
         focusable = [each for each in _focusable(root) if self._is_new(_focus_kind(each))]
         words = [each for each in words_of(root) if self._is_new(each.kind)]

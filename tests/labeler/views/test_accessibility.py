@@ -7,14 +7,25 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from accessible import WORD_CONTRAST, contrast_of, menu_words, painted_words, words_of
+import qtpy
+from accessible import WORD_CONTRAST, contrast_of, menu_words, painted_words, role_of, words_of
 from qtpy.QtCore import QPoint
-from qtpy.QtWidgets import QApplication, QFileDialog, QMenu, QMessageBox, QToolTip
+from qtpy.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QFileDialog,
+    QInputDialog,
+    QMenu,
+    QMessageBox,
+    QToolTip,
+    QWidget,
+)
 
 from gp_labeler.models.workflow import PointState
 from gp_labeler.scene.marks import LOOKED_AT, Mark, growth_of
 from gp_labeler.views.chips import SHAPES
 from gp_labeler.views.painting.marks import shape_of
+from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.theme import THEMES, contrast
 
 
@@ -107,3 +118,36 @@ def test_a_message_says_by_a_word_what_its_colour_says_and_screen_readers_are_to
         one_window.workspace.say("the scan has no bone", level)
         assert one_window.status.next_click.text() == text
     assert told == list(zip(texts, ("Polite", "Assertive", "Assertive"), strict=True))
+
+
+# Screen readers
+
+
+@pytest.mark.skipif(not qtpy.PYSIDE6, reason="PyQt6 says nothing of roles")
+def test_painted_widgets_and_exclusive_buttons_have_roles(one_window) -> None:
+    found = one_window.findChildren(QWidget)
+    roles = {type(each).__name__: role_of(each) for each in found if each is not one_window.rail.keys_button}
+    wanted = dict.fromkeys(("FeaturePicture", "SceneView", "SliceView"), "Graphic")
+    wanted |= {"HistogramSlider": "Slider", "Scrolled": "Grouping", "_RailButton": "RadioButton"}
+    assert {name: roles[name] for name in wanted} == wanted
+
+
+def test_a_list_of_choices_says_what_it_is_for(one_window) -> None:
+    """On Linux its name is the choice, so that its description has to say it."""
+    boxes = one_window.panels.findChildren(QComboBox)
+    assert len(boxes) > 1
+    assert [box.currentText() for box in boxes if not box.accessibleDescription()] == []
+
+
+def test_a_number_is_asked_for_in_plain_digits_until_it_is_one(monkeypatch) -> None:
+    given = iter([("abc", True), ("0", True), ("-1", True), ("nan", True), ("0,035", True), ("", False)])
+    shown = []
+
+    def answer(*_: object, text: str) -> tuple[str, bool]:
+        shown.append(text)
+        return next(given)
+
+    monkeypatch.setattr(QInputDialog, "getText", answer)
+    assert Prompts().number("Voxel size", "Voxel size, mm:", 0.05) == 0.035
+    assert Prompts().number("Voxel size", "Voxel size, mm:", 0.05) is None
+    assert set(shown) == {"0.05"}

@@ -327,9 +327,9 @@ def test_it_has_a_shape_of_its_own_everywhere(suggested) -> None:
     table = suggested.steps["label"].table
     row = [table.model.index(n, 1) for n in range(table.model.rowCount())]
     assert "suggested" in [index.data() for index in row]
-    assert table.model.headerData(1, Qt.Orientation.Horizontal) == "Left 0 + 1"
+    assert table.model.headerData(1, Qt.Orientation.Horizontal) == "Left 0/20"
     tip = table.model.headerData(1, Qt.Orientation.Horizontal, Qt.ItemDataRole.ToolTipRole)
-    assert tip == "0 placed, 1 suggested"
+    assert tip == "Left: 0 placed, 1 suggested"
     axial = axial_of(suggested)
     axial.zoom_to(INSIDE, 10.0)
     x, y = (int(n) for n in axial.pixel_at(INSIDE))

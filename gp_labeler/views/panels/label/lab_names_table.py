@@ -17,6 +17,7 @@ from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.labels import LabelNames, parse_label
 from gp_labeler.views.layouts import STRETCH, in_column, in_row
 from gp_labeler.views.panels.parts import ElidedLabel, emptied, text_label
+from gp_labeler.views.screen_reader import name_choice
 from gp_labeler.views.signals import blocked
 
 __all__ = ["LabNamesTable"]
@@ -140,7 +141,7 @@ class LabNamesTable(QWidget):
 
 def _choice(name: str) -> QComboBox:
     box = QComboBox()
-    box.setAccessibleName(f"Feature that {name} stands for")
+    name_choice(box, f"Feature that {name} stands for")
     box.addItem(_UNDECIDED, None)
     box.addItem(_LEFT_OUT, "")
     for feature in FEATURES:
@@ -151,7 +152,7 @@ def _choice(name: str) -> QComboBox:
 
 def _side_choice(name: str) -> QComboBox:
     box = QComboBox()
-    box.setAccessibleName(f"Side of the head that {name} is on")
+    name_choice(box, f"Side of the head that {name} is on")
     box.addItem(_EITHER_SIDE, None)
     for side in Side:
         box.addItem(side.word, side.value)

@@ -29,6 +29,7 @@ from gp_labeler.views.layouts import STRETCH, in_column, in_row, placed, wide
 from gp_labeler.views.panels.label.lab_names_table import LabNamesTable
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
 from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.screen_reader import name_choice
 
 __all__ = ["LandmarkImportDialog"]
 
@@ -75,7 +76,7 @@ class LandmarkImportDialog(QDialog):
 
     def _make_widgets(self) -> None:
         self.side = QComboBox()
-        self.side.setAccessibleName("Side of the head")
+        name_choice(self.side, "Side of the head")
         self.side.addItem("As the files say", None)
         for side in Side:
             self.side.addItem(side.word, side)

@@ -88,8 +88,9 @@ class LandmarkTableModel(QAbstractTableModel):
     ) -> Any:
         if orientation is not Qt.Orientation.Horizontal:
             return None
-        if role == Qt.ItemDataRole.ToolTipRole and section:
-            return self._workspace.labels.progress(SIDES[section - 1]).text
+        if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole) and section:
+            side = SIDES[section - 1]
+            return f"{side.word.capitalize()}: {self._workspace.labels.progress(side).text}"
         return self._headings[section] if role == Qt.ItemDataRole.DisplayRole else None
 
     def data(self, index: Index, role: int = int(Qt.ItemDataRole.DisplayRole)) -> Any:  # noqa: D102
@@ -121,8 +122,6 @@ class LandmarkTableModel(QAbstractTableModel):
 
     def _heading(self, side: Side) -> str:
         progress = self._workspace.labels.progress(side)
-        if progress.n_suggested:  # the total would not fit too; the tool tip names both counts
-            return f"{side.word.capitalize()} {progress.n_placed} + {progress.n_suggested}"
         return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}"
 
     def _cell(self, code: str, side: Side, state: PointState) -> _Cell:

@@ -15,6 +15,7 @@ from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.measure.distance_table import DistanceMatrixView
 from gp_labeler.views.panels.measure.measurement_table import MeasurementTable
 from gp_labeler.views.panels.parts import Card, open_at, scrolled, text_label
+from gp_labeler.views.screen_reader import name_choice
 from gp_labeler.views.signals import attempt, follow
 
 __all__ = ["MeasureDialog"]
@@ -48,7 +49,7 @@ class MeasureDialog(QDialog):
         self.hint = text_label(role="hint", wrap=True)
         self.summary, self.findings = text_label(wrap=True), FindingList()
         self.side = QComboBox()
-        self.side.setAccessibleName("Side whose distances are shown")
+        name_choice(self.side, "Side whose distances are shown")
         for side in Side:
             self.side.addItem(side.word.capitalize(), side)
         self.side.setCurrentIndex(list(Side).index(workspace.labels.active.side))

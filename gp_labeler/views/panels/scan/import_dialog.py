@@ -46,6 +46,7 @@ from gp_labeler.views.panels.scan.import_wording import (
 )
 from gp_labeler.views.panels.scan.preview_picture import PreviewPicture
 from gp_labeler.views.panels.scan.spacing_fields import SpacingFields
+from gp_labeler.views.screen_reader import name_choice
 from gp_labeler.views.signals import blocked, follow
 
 __all__ = ["ImportDialog"]
@@ -90,12 +91,12 @@ class ImportDialog(QDialog):
         self.facts = Facts()
         self.series = QComboBox()
         self.series.setPlaceholderText("Choose one of the scans")
-        self.series.setAccessibleName("Which scan of the folder")
+        name_choice(self.series, "Which scan of the folder")
         self.series.activated.connect(self._on_series)
         self.spacing = SpacingFields()
         self.spacing.changed.connect(self._update)
         self.stride = QComboBox()
-        self.stride.setAccessibleName("Voxels to load")
+        name_choice(self.stride, "Voxels to load")
         self.stride.currentIndexChanged.connect(self._update)
         self.reverse = QCheckBox("Reverse the order of the slices: exchanges left and right")
         self.reverse.toggled.connect(self._on_reverse)

@@ -8,6 +8,7 @@ from gp_labeler.imaging.slab import Slab
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, keep_room, text_label
+from gp_labeler.views.screen_reader import name_choice
 from gp_labeler.views.signals import attempt, blocked, follow
 
 __all__ = ["SlabCard"]
@@ -31,9 +32,9 @@ class SlabCard(Card):
         self._workspace = workspace
         self.mode, self.denoise = QComboBox(), QComboBox()
         self.mode.addItems(list(_MODES))
-        self.mode.setAccessibleName("Slab projection")
+        name_choice(self.mode, "Slab projection")
         self.denoise.addItems(list(_KINDS))
-        self.denoise.setAccessibleName("How the slices are denoised")
+        name_choice(self.denoise, "How the slices are denoised")
         self.thickness = NumberField("Thickness of the slab, mm")
         self.thickness.step = 0.1
         grid = QGridLayout()

@@ -13,6 +13,7 @@ from gp_labeler.views.formatting import spacing_text
 from gp_labeler.views.layouts import in_column
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import text_label
+from gp_labeler.views.screen_reader import name_choice
 from gp_labeler.views.signals import blocked
 
 __all__ = ["SpacingFields"]
@@ -32,7 +33,7 @@ class SpacingFields(QWidget):
         self.fields = [self._field(name) for name in "xyz"]
         self.unit = QComboBox()
         self.unit.addItems(list(UNITS))
-        self.unit.setAccessibleName("Unit of the voxel size")
+        name_choice(self.unit, "Unit of the voxel size")
         self.unit.currentTextChanged.connect(self._on_unit)
         self.same = QCheckBox("Isotropic (the same along all axes)")
         self.same.setChecked(True)

@@ -25,6 +25,7 @@ from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import open_at, text_label
 from gp_labeler.views.panels.scan.specimen_table_model import COLUMNS, SpecimenTableModel
 from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.screen_reader import name_choice
 from gp_labeler.views.signals import attempt, blocked, follow
 
 __all__ = ["SpecimenListDialog"]
@@ -119,7 +120,7 @@ class SpecimenListDialog(QDialog):
         self.search.setClearButtonEnabled(True)
         self.search.textChanged.connect(lambda text: self._workspace.specimens.show(words=text))
         self.kind = QComboBox()
-        self.kind.setAccessibleName("Which specimens")
+        name_choice(self.kind, "Which specimens")
         self.kind.addItems([kind.capitalize() for kind in FILTERS])
         self.kind.currentIndexChanged.connect(lambda n: self._workspace.specimens.show(kind=FILTERS[n]))
 
