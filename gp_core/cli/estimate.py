@@ -442,12 +442,12 @@ def _remarks(
         yield f"not seen by the tracker: {' '.join(sorted(touches.unseen))}"
     centre = None if path is None else rows_before_centre(path)
     if centre is not None:
-        yield f"! row {centre + 1} of the path is CO itself, where no path can be: --path-rows {centre}?"
+        yield f"! no path can reach CO, which is row {centre + 1} of this one: try --path-rows {centre}"
     for reason in PoseGate().reasons(pose, accepted=True):
         if reason.code in ("radius", "cone"):
             yield f"! a robot link would not send this pose: {reason.text}"
     if args.json or (not held_back and any((args.tfm, args.csv, args.path_out))):
-        yield f"y of what was written points to the {pose.round_window} round window"
+        yield f"the y axis of the written pose points to the {pose.round_window} round window"
 
 
 def _path_of(args: argparse.Namespace) -> FloatArray | None:

@@ -80,8 +80,8 @@ def test_estimate_says_what_names_and_paths_tell(tmp_path: Path, capsys: pytest.
     words.append("--accept-warnings")
     assert main(words) == 0
     text = capsys.readouterr().out
-    assert "! row 21 of the path is CO itself, where no path can be: --path-rows 20?" in text
-    assert "y of what was written points to the touched round window" in text
+    assert "! no path can reach CO, which is row 21 of this one: try --path-rows 20" in text
+    assert "the y axis of the written pose points to the touched round window" in text
     assert main([*words, "--path-rows", "20", "--round-window", "expected"]) == 0
     text = capsys.readouterr().out
     assert "CO itself" not in text
