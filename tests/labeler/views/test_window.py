@@ -159,20 +159,19 @@ def test_what_a_killed_program_left_is_offered(qtbot, window, make_window, tmp_p
 
 
 _KILLED = """
-import sys, time
+import sys
 from pathlib import Path
 from qtpy.QtCore import QPoint, Qt, QTimer
 from qtpy.QtTest import QTest
 from gp_labeler.views.application import make_application, make_window
-from window_cases import MIDDLE, PATIENCE_MS, ball_volume
+from window_cases import MIDDLE, ball_volume
 app = make_application()
 window = make_window(Path(sys.argv[1]), atlas=False)
 window.show()
 window.workspace.scan.begin(ball_volume())
-end = time.monotonic() + PATIENCE_MS / 1000
-while window.workspace.jobs.running and time.monotonic() < end:
-    app.processEvents()
 view = window.grid.scene_view
+while window.workspace.jobs.running or not view.scene.is_fine:
+    app.processEvents()
 x, y = view.pixel_at(MIDDLE)
 for dx in (0, 15, 30):
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=QPoint(int(x) + dx, int(y)))
