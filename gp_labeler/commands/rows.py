@@ -351,13 +351,13 @@ def landmark_rows() -> Iterator[Action]:
               _can_confirm, hint="Zooms in first if the point cannot be judged in the current view")
     yield row("point.accept_all", "Accept all ghosts of this side", (),
               lambda w: w.labels.accept_all_ghosts(),
-              lambda w: bool(w.labels.ghosts(w.labels.active.side)),
+              lambda w: bool(w.labels.ghosts(w.labels.active.side)), group="suggest",
               hint="They become suggestions, which you then confirm")
     yield row("point.suggest_like", "Suggest from my scans…", (), IN_WINDOW,
               lambda w: w.scan.volume is not None, checked=lambda w: w.first_labels.is_running,
-              hint="Suggests first labels from labelled scans; choose it again to stop")
+              group="suggest", hint="Suggests first labels from labelled scans; choose it again to stop")
     yield row("point.check_page", "Check suggestions in pages…", ("Ctrl+K",), IN_WINDOW,
-              lambda w: w.pages.can_begin,
+              lambda w: w.pages.can_begin, group="suggest",
               hint="Close views of nine suggestions at a time; doubtful ones come up in the views afterwards")
     yield row("point.place", "Place at the crosshair", ("Space",), _place_at_crosshair, _can_place,
               icon="label", hint="As a click at the crosshair: a landmark, the end of a ruler, or a touch")

@@ -36,6 +36,7 @@ _FOLDED = {
     "head": "Straighten the head",
     "planes": "Planes of the slices",
     "bone": "Bone in 3D",
+    "suggest": "Suggestions",
     "go": "Go to",
     "how": "While placing",
     "certainty": "Certainty",

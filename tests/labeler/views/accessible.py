@@ -33,6 +33,7 @@ from qtpy.QtWidgets import (
     QTextEdit,
     QWidget,
 )
+from replaced_methods import replaced
 from window_cases import image_bytes
 
 from gp_labeler.scene.colours import contrast
@@ -227,11 +228,8 @@ def _drawing() -> Iterator[list[Words]]:
             texts.append(Words(kind, str(args[-1]), device, _box(painter, args)))
         return draw(painter, *args, **options)
 
-    QPainter.drawText = drawn  # type: ignore[method-assign]
-    try:
+    with replaced(QPainter, "drawText", drawn):
         yield texts
-    finally:
-        QPainter.drawText = draw  # type: ignore[method-assign]
 
 
 def _box(painter: QPainter, args: tuple[object, ...]) -> QRect:

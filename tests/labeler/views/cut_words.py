@@ -34,6 +34,7 @@ from qtpy.QtWidgets import (
     QToolButton,
     QWidget,
 )
+from replaced_methods import replaced
 
 from gp_labeler.views.painting import name_tags
 from gp_labeler.views.panels.number_field import NumberField
@@ -311,11 +312,8 @@ def _painted() -> Iterator[tuple[list[_Text], list[tuple[str, str]]]]:
             shortened.append((words, result))
         return result
 
-    QPainter.drawText, QFontMetricsF.elidedText = drawn, short  # type: ignore[method-assign]
-    try:
+    with replaced(QPainter, "drawText", drawn), replaced(QFontMetricsF, "elidedText", short):
         yield texts, shortened
-    finally:
-        QPainter.drawText, QFontMetricsF.elidedText = draw, shorten  # type: ignore[method-assign]
 
 
 def _all_painted(root: QWidget) -> tuple[list[list[_Text]], list[tuple[str, str]]]:
