@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
-from qtpy.QtCore import QCoreApplication, QEvent, QEventLoop, QTimer
+from qtpy.QtCore import QCoreApplication, QEvent, QEventLoop, Qt, QTimer
 from qtpy.QtGui import QImage
 from qtpy.QtWidgets import QApplication, QWidget
 
@@ -131,7 +131,7 @@ def close(window) -> None:
 
 def left_behind() -> Counter[str]:
     """Count the widgets, and the actors, renderers and render windows of VTK, that are alive, by type."""
-    return _never_let_go(lambda: _names(QApplication.allWidgets()) + _scenes())
+    return _never_let_go(lambda: _names(_but_the_desktop(QApplication.allWidgets())) + _scenes())
 
 
 def left_by_test(before: list[QWidget], patience_s: float = LET_GO_S) -> Counter[str]:
@@ -146,7 +146,12 @@ def left_by_test(before: list[QWidget], patience_s: float = LET_GO_S) -> Counter
 
 def top_level_widgets() -> list[QWidget]:
     """Return all windows, dialogs and menus that are alive, shown or not."""
-    return QApplication.topLevelWidgets()
+    return _but_the_desktop(QApplication.topLevelWidgets())
+
+
+def _but_the_desktop(widgets: Iterable[QWidget]) -> list[QWidget]:
+    """Leave out Qt's own widget of the whole desktop, which some versions make with a menu."""
+    return [widget for widget in widgets if widget.windowType() != Qt.WindowType.Desktop]
 
 
 def _never_let_go(alive: Callable[[], Counter[str]], patience_s: float = LET_GO_S) -> Counter[str]:
