@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from qtpy.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from qtpy.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
+from qtpy.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPaintEvent, QPen
 from qtpy.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from gp_core.landmarks.features import feature
@@ -92,13 +92,14 @@ class _ClosePictures(QWidget):
                 painter.drawEllipse(middle, radius, radius)
 
     def _name(self, painter: QPainter, box: QRectF, name: str) -> None:
-        """Write which plane it is, at the foot."""
+        """Write which plane it is, at the foot, on a ground of its own: pictures are dark and light."""
         painter.setFont(font_of(self, CAPTION))
-        where = box.adjusted(5, 0, -5, -3)
-        flags = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom
-        for dx, colour in ((1, QColor(0, 0, 0, 200)), (0, QColor("#FFFFFF"))):
-            painter.setPen(colour)
-            painter.drawText(where.translated(dx, dx), flags, name)
+        metrics = QFontMetricsF(painter.font())
+        width, height = metrics.horizontalAdvance(name) + 6, metrics.height() + 2
+        ground = QRectF(box.left() + 2, box.bottom() - height - 2, width, height)
+        painter.fillRect(ground, QColor("#000000"))
+        painter.setPen(QColor("#FFFFFF"))
+        painter.drawText(ground, Qt.AlignmentFlag.AlignCenter, name)
 
 
 class CloseViewTile(QAbstractButton):

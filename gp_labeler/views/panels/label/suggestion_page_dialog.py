@@ -10,6 +10,7 @@ from qtpy.QtWidgets import QDialog, QGridLayout, QPushButton, QWidget
 
 from gp_labeler.models.suggestion_pages import PAGE_SIZE
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.fonts import fit
 from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.label.close_view_tile import CloseViewTile
 from gp_labeler.views.panels.parts import open_at, scrolled, text_label
@@ -17,7 +18,10 @@ from gp_labeler.views.signals import attempt, follow
 
 __all__ = ["SuggestionPageDialog"]
 
-_COLUMNS = 3
+_MOST_COLUMNS = 3
+_GAP = 8
+_BESIDE = 60
+"""Logical pixels that the margins and the scroll bar take."""
 
 
 class SuggestionPageDialog(QDialog):
@@ -84,15 +88,12 @@ class SuggestionPageDialog(QDialog):
         return button
 
     def _lay_out(self) -> None:
-        page, grid = QWidget(), QGridLayout()
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setSpacing(8)
-        for n, tile in enumerate(self.tiles):
-            grid.addWidget(tile, n // _COLUMNS, n % _COLUMNS)
-        for column in range(_COLUMNS):
-            grid.setColumnStretch(column, 1)
+        page, self._grid = QWidget(), QGridLayout()
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setSpacing(_GAP)
         page.setProperty("role", "panel")
-        page.setLayout(grid)
+        page.setLayout(self._grid)
+        fit(self, self._arrange)
         close = self._button("Close", self.reject, "What is left comes up in the views")
         buttons = in_row(self.back, self.leave, STRETCH, close, self.confirm, margins=0)
         explained, self.area = text_label(_EXPLAINED, "hint", wrap=True), scrolled(page)
@@ -100,6 +101,16 @@ class SuggestionPageDialog(QDialog):
             self.text, explained, wide(self.area), buttons, margins=(14, 10, 14, 12), spacing=8, of=self
         )
         self._enter((page, self.confirm))
+
+    def _arrange(self) -> None:
+        """Lay the tiles in as many columns as the screen is wide enough for; the rest scrolls."""
+        widest = max(tile.minimumSizeHint().width() for tile in self.tiles)
+        room = self.screen().availableSize().width() - _BESIDE
+        n_columns = min(max(room // (widest + _GAP), 1), _MOST_COLUMNS)
+        for n, tile in enumerate(self.tiles):
+            self._grid.addWidget(tile, n // n_columns, n % n_columns)
+        for column in range(_MOST_COLUMNS):
+            self._grid.setColumnStretch(column, int(column < n_columns))
 
     def _enter(self, where: tuple[QWidget, ...]) -> None:
         """Let Enter confirm the page; a key that is held down confirms no second one."""
