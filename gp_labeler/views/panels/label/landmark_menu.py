@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from qtpy.QtCore import Qt
 from qtpy.QtGui import QGuiApplication
 from qtpy.QtWidgets import QMenu, QWidget
 
@@ -18,8 +19,9 @@ __all__ = ["landmark_menu"]
 
 
 def landmark_menu(workspace: Workspace, side: Side, code: str, parent: QWidget) -> QMenu:
-    """Return the menu of a point: what can be done to it, and where it is."""
+    """Return the menu of a point: what can be done to it, and where it is; it is gone once it is closed."""
     menu = QMenu(parent)
+    menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     document = workspace.document
 
     def add(text: str, edit: Callable[[], object], *, enabled: bool = True, to: QMenu = menu) -> None:

@@ -105,7 +105,6 @@ class LandmarkTable(QWidget):
         index = self.view.indexAt(position)
         if index.isValid():
             menu = landmark_menu(self._workspace, *self.target_of(index), self)
-            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
             menu.popup(self.view.viewport().mapToGlobal(position))
 
     def clear_current(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from qtpy.QtCore import Qt
 from qtpy.QtGui import QGuiApplication
 from qtpy.QtWidgets import QInputDialog, QMenu, QWidget
 
@@ -14,8 +15,9 @@ __all__ = ["measurement_menu"]
 
 
 def measurement_menu(workspace: Workspace, name: str, index: int, parent: QWidget) -> QMenu:
-    """Return the menu of a measurement, opened on one of its points."""
+    """Return the menu of a measurement, opened on one of its points; it is gone once it is closed."""
     menu, measure = QMenu(parent), workspace.measure
+    menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     measurement = workspace.document.state.measurement(name)
 
     def add(text: str, call: Callable[[], object]) -> None:
