@@ -112,6 +112,7 @@ class CloseViewTile(QAbstractButton):
         super().__init__(parent)
         self.entry: PageEntry | None = None
         self.setCheckable(True)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.heading, self.state = text_label(role="heading"), text_label(role="hint", wrap=True)
         self.how_sure, self.pictures = text_label(role="hint"), _ClosePictures()
