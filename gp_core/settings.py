@@ -133,12 +133,20 @@ def _configuration_folder() -> Path:
     return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
 
 
+def _content(file: Path) -> bytes:
+    if file.exists() and not file.is_file():  # opening a pipe waits, and a device may never end
+        raise GpError("is not a plain file", file=file, remedy="Name a settings file.")
+    with file.open("rb") as opened:
+        content = opened.read(_MAX_BYTES + 1)
+    if len(content) > _MAX_BYTES:
+        raise GpError("is too large for a settings file", file=file)
+    return content
+
+
 @cache
 def _read(file: Path) -> Mapping[str, Any]:
     try:
-        if file.stat().st_size > _MAX_BYTES:
-            raise GpError("is too large for a settings file", file=file)
-        values: Mapping[str, Any] = _toml_loader()(file.read_text(encoding="utf-8"))
+        values: Mapping[str, Any] = _toml_loader()(_content(file).decode("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         remedy = "Correct it, or delete it: it holds settings only."
         raise GpError(f"the settings cannot be read ({error})", file=file, remedy=remedy) from None

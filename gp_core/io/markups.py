@@ -116,8 +116,8 @@ def has_point_list(path: str | PathLike[str]) -> bool:
         markups = load_markups(path)["markups"]
     except GpError:
         return True
-    kinds = {markup.get("type") if isinstance(markup, dict) else None for markup in markups}
-    return not kinds or not kinds <= _OTHER_KINDS
+    kinds = [markup.get("type") if isinstance(markup, dict) else None for markup in markups]
+    return not kinds or any(not isinstance(kind, str) or kind not in _OTHER_KINDS for kind in kinds)
 
 
 def load_markups(path: str | PathLike[str]) -> dict[str, Any]:

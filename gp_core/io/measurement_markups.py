@@ -135,9 +135,10 @@ def read_measurements(path: str | PathLike[str]) -> tuple[Measurement, ...]:
             remedy="Choose rulers and angles that were measured in a scan.",
         )
     kinds = [markup.get("type") if isinstance(markup, dict) else None for markup in content["markups"]]
-    found = [m for m, kind in zip(content["markups"], kinds, strict=True) if kind in _KINDS]
-    for kind in kinds:
-        if kind not in _KINDS:
+    known = [isinstance(kind, str) and kind in _KINDS for kind in kinds]
+    found = [markup for markup, is_known in zip(content["markups"], known, strict=True) if is_known]
+    for kind, is_known in zip(kinds, known, strict=True):
+        if not is_known:
             _log.warning("%s: passed over a markup of type %s", path, shown(kind))
     if not found:
         raise FileFormatError(

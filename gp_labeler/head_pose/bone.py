@@ -50,6 +50,9 @@ _NORMAL_MEDIAN = 0.6745
 _NOISY, _BLUR_VOXELS = 0.05, 1.0
 """Noise over the range of grey values above which a copy is smoothed, and by how much."""
 
+_FEWEST_NOISY = 0.1
+"""Share of the second differences that are not 0, at least, in a scan with noise."""
+
 _RING_VOXELS = 8.0
 """How far around a voxel its slice tells what it would be without a ring, or a wider shade."""
 
@@ -176,13 +179,13 @@ def _noise(grid: _Values) -> float:
     """Return the standard deviation of noise over the range of grey values.
 
     It is taken from second differences along the noisiest axis, the median of those that are not 0: what is
-    constant, such as a fill, has none.
+    constant, such as a fill, has none. Where nearly all are 0, the rest are edges, and there is no noise.
     """
     low, high = (float(v) for v in np.percentile(grid[::2, ::2, ::2], _TAILS_PERCENT))
     if not low < high:
         return 0.0
     differences = [np.abs(np.diff(grid, 2, axis=axis)) for axis in range(3) if grid.shape[axis] > 2]
-    medians = [float(np.median(d[d > 0])) for d in differences if d.any()]
+    medians = [float(np.median(d[d > 0])) for d in differences if (d > 0).mean() > _FEWEST_NOISY]
     return max([*medians, 0.0]) / (_NORMAL_MEDIAN * float(np.sqrt(6.0)) * (high - low))
 
 

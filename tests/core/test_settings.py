@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -39,6 +40,17 @@ def test_a_file_that_is_named_must_be_there(file: Path) -> None:
     file.unlink()
     with pytest.raises(GpError, match=r"settings\.toml: the settings cannot be read \(.*No such file"):
         setting("theme")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a named pipe")
+def test_a_pipe_or_an_endless_device_is_no_settings_file(
+    file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    for path in (str(tmp_path / "pipe.toml"), "/dev/zero", str(tmp_path)):
+        monkeypatch.setenv("GP_LABELER_SETTINGS", path)
+        with pytest.raises(GpError, match="is not a plain file"):
+            setting("theme")
 
 
 def test_the_file_says_and_the_variable_overrules(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,8 @@ from landmark_makers import SHARED, control_point, markup, needs_shared_data, wr
 
 from gp_core.errors import FeatureError, FileFormatError
 from gp_core.io import read_landmarks, read_points
+from gp_core.io.markups import has_point_list
+from gp_core.io.measurement_markups import read_measurements
 from gp_core.landmarks.sets import Status
 
 
@@ -110,6 +112,18 @@ def test_several_point_lists_are_one_and_other_markups_are_passed_over(file, cap
     assert landmarks.placed == ("CA", "CB")
     assert landmarks["CB"].tolist() == [-1, -2, 3]
     assert "type 'Line'" in caplog.text
+
+
+@pytest.mark.parametrize("kind", [["Line"], {"Line": 1}, None, 3])
+def test_a_type_that_is_no_word_is_another_kind_of_markup(file, caplog, kind):
+    odd = {"type": kind, "controlPoints": [control_point("CL")]}
+    write_json(file, odd, markup(control_point("CA")))
+    assert read_landmarks(file).placed == ("CA",)
+    assert has_point_list(file)
+    write_json(file, odd)
+    assert has_point_list(file), "so that reading it says why it cannot be read"
+    with pytest.raises(FileFormatError, match="no ruler or angle"):
+        read_measurements(file)
 
 
 def test_a_slicermorphr_file(file):
