@@ -96,6 +96,9 @@ def cut_in_looks(window: MainWindow, state: str, root: QWidget) -> Iterator[str]
             width, height = screen if isinstance(root, GuideWindow) else root.size().toTuple()
             root.resize(min(width, screen[0]), min(height, screen[1]))
         lines = cut_words(root, own=OWN, screen=screen)
+        if lines:  # a job that has just ended may have shown more, which Qt lays out with its next events
+            QApplication.processEvents()
+            lines = cut_words(root, own=OWN, screen=screen)
         if (size, screen) in TALL_MENUS:
             lines = [line for line in lines if not line.startswith("menu ")]
         lines = [line for line in lines if not line.startswith(SCROLLS_SIDEWAYS)]
