@@ -54,7 +54,7 @@ def make_small_heads(here: Path) -> None:
 
 
 def make_scans(here: Path) -> None:
-    """Make a labelled head, its specimen file in ``scans/`` too, a script, and two heads in one scan."""
+    """Make a labelled head, its specimen file in ``scans/`` too, two scripts, and two heads in one scan."""
     save_phantom(make_phantom(7, spacing=0.4), here / "head.nrrd", labelled=True)
     head = read_volume(here / "head.nrrd")
     (here / "scans").mkdir()
@@ -63,7 +63,11 @@ def make_scans(here: Path) -> None:
     for side in "LR":
         (here / f"head_{side}.mrk.json").rename(here / f"GP-014_{side}.mrk.json")
     save_volume(here / "two-heads.nrrd", _beside_itself(head))
-    (here / "script.toml").write_text('[[step]]\ndo = "open"\npath = "head.nrrd"\n', encoding="utf-8")
+    for name, scan in (("script", "head"), ("batch", "{specimen}")):
+        text = f'[[step]]\ndo = "open"\npath = "{scan}.nrrd"\n'
+        (here / f"{name}.toml").write_text(text, encoding="utf-8")
+    for specimen in ("GP-01", "GP-02", "GP-03"):
+        (here / f"{specimen}.nrrd").symlink_to(here / "head.nrrd")
 
 
 def _write_specimen(file: Path, head: Volume, labels: Path) -> None:
