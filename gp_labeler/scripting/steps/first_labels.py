@@ -89,7 +89,7 @@ class CheckPages(Step):
             press_keys(dialog.tiles[0], "Return")
         driver.wait_until_idle()
         left = _n_suggested(driver)
-        return f"{before - left} confirmed on {n_pages} pages, {left} left"
+        return f"{before - left} confirmed on {n_pages} {'page' if n_pages == 1 else 'pages'}, {left} left"
 
     def _is_wanted(
         self, driver: WindowDriver, entry: PageEntry | None, wanted: set[tuple[Side, str]]

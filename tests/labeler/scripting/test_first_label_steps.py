@@ -45,3 +45,17 @@ def test_a_script_checks_labelled_scans_against_each_other(folder):
     strict = run(folder, {**check, "strict": True})
     assert not strict.ok
     assert "CA_L and OI_L seem to be exchanged" in strict.error
+
+
+def test_pages_confirm_all_but_what_somebody_wants_to_look_at(tmp_path):
+    placed = [
+        {"do": "place", "feature": code, "side": "L", "at": "truth"} for code in ("CA", "RWA", "OI", "IN")
+    ]
+    ghosts = [{"do": "place", "feature": code, "side": "L", "at": "ghost"} for code in ("CB", "RWP", "FPA")]
+    check = {"do": "check_pages", "look_at": ["CB L"]}
+    report = run(tmp_path, {"do": "open", "phantom": 0}, *placed, *ghosts, check)
+    assert report.ok, report.error
+    assert {each["feature"] for each in report.suggested} == {"CB"}
+    placed_codes = {each["feature"] for each in report.features}
+    assert {"RWP", "FPA"} <= placed_codes
+    assert "CB" not in placed_codes
