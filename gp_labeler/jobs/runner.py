@@ -153,7 +153,9 @@ class Jobs:
     def __init__(self, dispatcher: Dispatcher | None = None, *, n_workers: int = 2) -> None:
         self.dispatcher = dispatcher or (lambda call: call())
         self._pool = ThreadPoolExecutor(n_workers, thread_name_prefix="gp-job")
-        self._tasks: list[Task[Any]] = []
+        self._tasks: dict[Task[Any], Callable[[Any], None] | None] = {}
+        # what a task calls when it is done stays here, not with the worker: a worker that let go of a dialog
+        # last would destroy it on its own thread
         self._closed = False
 
     @property
@@ -182,9 +184,9 @@ class Jobs:
         if key:
             self.cancel(key)
         new = Task(job, key, self._report)
-        self._tasks.append(new)
+        self._tasks[new] = done
         self.started.emit(new)
-        self._pool.submit(self._run, new, done, after)
+        self._pool.submit(self._run, new, after)
         return new
 
     def is_running(self, *keys: str) -> bool:
@@ -209,7 +211,7 @@ class Jobs:
         self._pool.shutdown(wait=True, cancel_futures=True)
         self._tasks.clear()
 
-    def _run(self, task: Task[R], done: Callable[[R], None] | None, after: float) -> None:
+    def _run(self, task: Task[R], after: float) -> None:
         """On the worker: whatever the job does, the worker lives on."""
         result: R | None = None
         error: Exception | None = None
@@ -223,24 +225,17 @@ class Jobs:
             if not isinstance(caught, GpError):
                 _log.exception("%s failed", task.job.title)
             state, error = TaskState.FAILED, _without_frames(caught)
-        self.dispatcher(lambda: self._finish(task, state, result, error, done))
+        self.dispatcher(lambda: self._finish(task, state, result, error))
 
-    def _finish(
-        self,
-        task: Task[R],
-        state: TaskState,
-        result: R | None,
-        error: Exception | None,
-        done: Callable[[R], None] | None,
-    ) -> None:
+    def _finish(self, task: Task[R], state: TaskState, result: R | None, error: Exception | None) -> None:
         if self._closed or task not in self._tasks:
             return
-        self._tasks.remove(task)
+        done = self._tasks.pop(task)
         if task.progress.cancelled():  # it may have come to its end before it noticed
             state, result, error = TaskState.CANCELLED, None, None
         task.state, task.result, task.error = state, result, error
         if state is TaskState.DONE and done is not None:
-            done(result)  # type: ignore[arg-type]
+            done(result)
         {TaskState.DONE: self.done, TaskState.FAILED: self.failed}.get(state, self.cancelled).emit(task)
 
     def _report(self, task: Task[Any], fraction: float, text: str) -> None:

@@ -24,6 +24,7 @@ from gp_labeler.system.plain_numbers import use_plain_numbers
 from gp_labeler.views.canvas_choice import choose_canvas, share_contexts
 from gp_labeler.views.canvas_question import offer_measurement
 from gp_labeler.views.dispatch import QtDispatcher
+from gp_labeler.views.garbage_collection import collect_on_this_thread
 from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.panels.table import panel_at_fault
 from gp_labeler.views.prompts import Prompts
@@ -83,7 +84,7 @@ def make_window(directory: Path | None = None, *, atlas: bool = True) -> MainWin
     atlas : bool
         Whether to load the atlas chosen last, else the published one, for ghosts.
     """
-    make_application()
+    collect_on_this_thread(make_application())
     describe_widgets()
     importlib.import_module("scipy.ndimage")  # the scene needs it; no job may be importing SciPy meanwhile
     dispatcher = QtDispatcher()

@@ -48,6 +48,7 @@ def _set_aside(request: pytest.FixtureRequest) -> None:
     Looking for it takes milliseconds. It is done once the test is torn down: until then, pytest keeps the
     frames of a fixture that skipped it.
     """
+    gc.disable()  # as the window does: no background job may destroy what a test showed
     if _is_checked(request.node):
         request.node.stash[_BEFORE] = top_level_widgets()
         gc.freeze()
@@ -73,6 +74,13 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
     if (nextitem is None or nextitem.path != item.path) and _is_checked(item):
         left = left_behind()
         assert not left, f"left behind by the tests of {item.path.name}"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _collect_after_each_file() -> Iterator[None]:
+    yield
+    gc.collect()
+    gc.enable()
 
 
 def _is_checked(item: pytest.Item) -> bool:

@@ -1,0 +1,47 @@
+"""Keeps Python's garbage collector on the thread of the windows.
+
+Python looks for cycles of objects on whichever thread happens to make one object too many. A background job
+would destroy a widget that is part of a cycle, such as a dialog that was closed. Qt and VTK allow that on
+their own thread only: the program would end with a segmentation fault.
+"""
+
+from __future__ import annotations
+
+import gc
+
+from qtpy.QtCore import QObject, QTimer
+
+__all__ = ["collect_on_this_thread"]
+
+_INTERVAL_MS = 500
+"""As often as Python itself collects while a scan is labelled."""
+
+
+def collect_on_this_thread(application: QObject) -> None:
+    """Stop the collector on all threads, and run it where an application has its event loop.
+
+    Parameters
+    ----------
+    application : QObject
+        The Qt application, which lives on this thread; asked twice, it has one collector.
+    """
+    gc.disable()
+    if application.findChild(_Collector) is None:
+        gc.freeze()  # the modules' own objects stay: to look through them all would take 50 ms each time
+        _Collector(application)
+
+
+class _Collector(QObject):
+    """Collects what is due, as Python would: the youngest objects often, all of them seldom."""
+
+    def __init__(self, application: QObject) -> None:
+        super().__init__(application)
+        self._timer = QTimer(self, interval=_INTERVAL_MS)
+        self._timer.timeout.connect(self._collect)
+        self._timer.start()
+
+    def _collect(self) -> None:
+        generations = zip(gc.get_count(), gc.get_threshold(), strict=True)
+        due = [age for age, (count, threshold) in enumerate(generations) if count > threshold > 0]
+        if due:
+            gc.collect(due[-1])
