@@ -6,6 +6,7 @@ test_tutorials.
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
@@ -17,7 +18,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from page_cases import PAGES, make_animals, make_small_heads
+from page_cases import DOCS, PAGES, ROOT, make_animals, make_small_heads
 
 import gp_core
 from gp_core import Atlas, LandmarkSet, Side, read_landmarks
@@ -153,6 +154,24 @@ def test_every_script_runs_and_settings_are_known(page: str, table: str, folder:
         assert read.keys() <= {key.name for key in KEYS}
     elif page != "extensions":  # whose example package is installed by tests/labeler/test_extensions.py
         _run_script_of_steps(read["step"], folder)
+
+
+_READERS = ROOT / "gp_labeler" / "imaging" / "readers"
+
+
+def _acceptable(call: ast.Call) -> bool:
+    """Whether a call makes a problem of a scan that ``--accept`` resolves."""
+    is_problem = isinstance(call.func, ast.Name) and call.func.id == "Problem"
+    return is_problem and "'accept'" in ast.unparse(call)
+
+
+def test_the_page_of_files_lists_every_code_that_can_be_accepted() -> None:
+    trees = [ast.parse(file.read_text(encoding="utf-8")) for file in sorted(_READERS.glob("*.py"))]
+    calls = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    codes = {ast.literal_eval(call.args[0]) for call in calls if _acceptable(call)}
+    page = (DOCS / "files.md").read_text(encoding="utf-8")
+    table = page.partition("| `--accept` code |")[2].partition("\n\n")[0]
+    assert codes == set(re.findall(r"^\| `([a-z-]+)` \|", table, re.MULTILINE))
 
 
 def _run_script_of_steps(steps: list[dict[str, object]], folder: Path) -> None:

@@ -1,8 +1,8 @@
 """Run the code blocks of a page as a reader would, one after the other, in an empty folder.
 
 ``console``: what follows ``$`` is run, and must print what stands below it (``...`` is anything); where that
-is the line of an error, such as ``gp-core: …``, it must end with status 2. ``python`` with prompts is a
-doctest. A block whose first line is ``# name.ext`` is saved as that file.
+is the line of an error, such as ``gp-core: …``, it must end with status 2; after ``; echo $?`` its status is
+shown. ``python`` with prompts is a doctest. A block whose first line is ``# name.ext`` is saved as that file.
 """
 
 from __future__ import annotations
@@ -30,8 +30,10 @@ def run_page(page: Path) -> int:
     for language, block in _BLOCK.findall(page.read_text(encoding="utf-8")):
         if language == "console":
             for command, expected in _commands(block):
-                refused = expected.startswith(("gp-labeler: ", "gp-core: "))
-                _check(page, command, expected, _run(command, status=2 if refused else 0))
+                command, asks, _ = command.partition("; echo $?")
+                status = _status(expected, is_shown=bool(asks))
+                printed = _run(command, status=status) + (f"{status}\n" if asks else "")
+                _check(page, command, expected, printed)
                 count += 1
         elif language == "python":
             test = doctest.DocTestParser().get_doctest(block, names, page.name, str(page), 0)
@@ -50,6 +52,13 @@ def _commands(block: str) -> Iterator[tuple[str, str]]:
     for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
         command, _, expected = part.partition("\n")
         yield command, expected
+
+
+def _status(expected: str, *, is_shown: bool) -> int:
+    """Return the status with which a command must end: the last line where it is shown, 2 for an error."""
+    if is_shown:
+        return int(expected.split()[-1])
+    return 2 if expected.startswith(("gp-labeler: ", "gp-core: ")) else 0
 
 
 def _run(command: str, *, status: int) -> str:

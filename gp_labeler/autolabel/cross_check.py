@@ -63,7 +63,8 @@ class LibraryFinding:
     @property
     def text(self) -> str:
         """One sentence."""
-        off = f"{self.distance:.2f} mm from its prediction by the other scans, usually {self.expected:.2f}"
+        usual = f"usually {self.expected:.2f} mm"
+        off = f"{self.distance:.2f} mm from the prediction of the other scans, {usual}"
         if self.kind == "exchanged":
             return f"{self.names[0]} and {self.names[1]} seem to be exchanged ({off})"
         if self.kind == "sides exchanged":

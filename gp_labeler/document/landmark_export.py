@@ -45,7 +45,7 @@ _WRITERS: Mapping[str, Writer] = {
 FORMATS = tuple(_WRITERS)
 
 
-CO_IS_COMPUTED = "CO is computed from CA, CB, RWA and RWP"
+CO_IS_MISSING = "CO is missing: it is computed from CA, CB, RWA and RWP"
 """Said where CO is missing: nobody is to place it."""
 
 
@@ -93,7 +93,7 @@ class ExportReport:
                 if codes:
                     lines.append(f"Missing on the {side.word} side, {what}: {' '.join(codes)}.")
             if "CO" in self.to_do[side]:
-                lines.append(f"Missing on the {side.word} side: {CO_IS_COMPUTED}.")
+                lines.append(f"On the {side.word} side, {CO_IS_MISSING}.")
         return "\n".join(lines)
 
 

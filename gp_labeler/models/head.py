@@ -35,12 +35,13 @@ FREE_POINTS = ("midline", "left", "right")
 """Three points that need be no landmarks: one of the midline, and the same place on both sides."""
 
 _KEY = "straighten"
+_RESET_PLANES = "Choose View > Planes of the slices > Reset the planes first."
 _WRONG_SIDE_MM = 1.0
 """A point that lies farther on the other side of the mid-plane is said to be there."""
 
 
 class HeadModel:
-    """Straightens the head: by itself, by points, by landmarks or by hand. Nothing of the scan changes.
+    """Straightens the head: automatically, by points, by landmarks or by hand. Nothing of the scan changes.
 
     Parameters
     ----------
@@ -240,13 +241,11 @@ class HeadModel:
             The views show planes along an ear, or not three planes at right angles.
         """
         if self._view.shows_anatomy:
-            raise GpError(
-                "the views show planes of an ear, not the head frame", remedy="Straighten them first."
-            )
+            raise GpError("the views show planes of an ear, not the head frame", remedy=_RESET_PLANES)
         sagittal, coronal, axial = (self._view.planes[n] for n in ("sagittal", "coronal", "axial"))
         axes = np.stack([sagittal.normal, coronal.normal, axial.normal])
         if np.linalg.det(axes) < 1 - 1e-6:
-            raise GpError("the three views are not perpendicular", remedy="Straighten them first.")
+            raise GpError("the three views are not perpendicular", remedy=_RESET_PLANES)
         origin = sagittal.origin if self.is_shown else self._view.crosshair
         self._take_by_hand(axes, origin, merge=merge)
 
@@ -259,7 +258,7 @@ class HeadModel:
             The head is not straightened yet.
         """
         if self.frame is None:
-            raise GpError("the head is not straightened yet", remedy="View > Straighten the head.")
+            raise GpError("the head is not straightened yet", remedy="Choose View > Straighten the head.")
         axes = self.frame.T_head_scan.rotation
         away = float(self.frame.heights(self._view.crosshair[None])[0])
         origin = self.frame.T_head_scan.inverse().translation + away * axes[0]
@@ -343,7 +342,7 @@ class HeadModel:
             The head is not straightened yet.
         """
         if self.frame is None:
-            raise GpError("the head is not straightened yet", remedy="View > Straighten the head.")
+            raise GpError("the head is not straightened yet", remedy="Choose View > Straighten the head.")
         self._document.show_head_frame(not self.is_shown if on is None else on)
 
     # Inside

@@ -257,7 +257,9 @@ class MeasureModel:
         """Remove measurements, by default the selected one; raises `GpError` where there is none such."""
         chosen = names or ((self._selected,) if self._selected is not None else ())
         if not chosen:
-            raise GpError("no measurement is selected", remedy="Choose one in Measure > Measurements.")
+            raise GpError(
+                "no measurement is selected", remedy="Choose one in Measure > Measurements and distances."
+            )
         self._document.do(RemoveMeasurements(tuple(chosen)))
 
     # Files

@@ -458,7 +458,10 @@ class PoseModel:
             There is none, the pose is in doubt as for `export`, or the file cannot be written.
         """
         if self._path is None:
-            raise GpError("there is no insertion path", remedy="Load one with Insertion path first.")
+            raise GpError(
+                "there is no insertion path",
+                remedy="Choose Estimate > Export and report > Insertion path first.",
+            )
         self._check_writable(self._pose(), path)
         assert self.estimate is not None
         file = self._path.save_carried(self.estimate, path)

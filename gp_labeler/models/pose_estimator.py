@@ -82,7 +82,9 @@ class PoseEstimator:
         check_option(settings.round_window, "round window", ROUND_WINDOWS)
         for name in settings.midline:
             if not is_skull_feature(name):
-                raise GpError(f"{name} is no skull feature", remedy="Name touched ones, such as S1, S4.")
+                raise GpError(
+                    f"{name} is no skull feature", remedy="Name touched skull features, such as S1, S4."
+                )
         differs = settings != self.settings
         if differs:
             self.settings = settings

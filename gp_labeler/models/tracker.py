@@ -242,7 +242,7 @@ class TrackerModel:
             No tracker is connected.
         """
         if self._link is None:
-            raise GpError("no tracker is connected", remedy="Connect one in the Pose panel.")
+            raise GpError("no tracker is connected", remedy="Click Tracker in the step 4 Pose.")
         self._keep_aim()
         self._recorder.press()
 
@@ -365,7 +365,7 @@ class TrackerModel:
         was_recording = self._recorder.recording
         self._recorder.cancel()
         if was_recording:
-            self.refused.emit(f"{name or 'Nothing'} is no longer requested. Touch again.")
+            self.refused.emit(f"{name or 'The feature'} is no longer requested. Touch the one that is.")
 
     def _take(self, outcome: RecordedTouch | RefusedTouch) -> None:
         if isinstance(outcome, RefusedTouch):

@@ -157,9 +157,9 @@ class ViewModel:
     planes_changed = Signal()
     """The slice views show other planes, or name directions in another frame."""
     turning_changed = Signal(bool)
-    """Whether a hand is turning the planes: what takes long is drawn coarsely meanwhile."""
+    """Whether the user is turning the planes: what takes long is drawn coarsely meanwhile."""
     planes_turned = Signal(str, float)
-    """(view, angle): a hand has turned the planes of the two other views, by `rotate_planes`."""
+    """(view, angle): the user has turned the planes of the two other views, by `rotate_planes`."""
     point_shown = Signal(object)
     """(3,) scan position that every view shall bring into view, mm."""
 

@@ -64,7 +64,7 @@ def test_what_is_missing_is_said(editing, tmp_path):
         "Missing on the left side, to do: ZL.",
         "Missing on the left side, not seen: MN.",
         "Missing on the right side, to do: CA.",
-        "Missing on the right side: CO is computed from CA, CB, RWA and RWP.",
+        "On the right side, CO is missing: it is computed from CA, CB, RWA and RWP.",
     ]
     one = Editing(ImportLandmarks((shape(L),), MARK).apply(SpecimenState("B")))
     report = export_landmarks(one.document.state, tmp_path)

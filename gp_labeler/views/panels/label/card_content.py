@@ -279,7 +279,7 @@ def _between(labels: LabelsModel) -> CardContent:
     return CardContent(
         totals,
         name="Everything is labelled",
-        definition=f"{warning}When you are satisfied with them, export the landmarks of both sides.",
+        definition=f"{warning}When you are satisfied with the labels, export the landmarks of both sides.",
         status="Nothing is left to do.",
         status_role="good",
         state="checked",

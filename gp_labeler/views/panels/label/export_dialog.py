@@ -20,7 +20,7 @@ from qtpy.QtWidgets import (
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
-from gp_labeler.document.landmark_export import CO_IS_COMPUTED, FORMATS, export_landmarks, export_names
+from gp_labeler.document.landmark_export import CO_IS_MISSING, FORMATS, export_landmarks, export_names
 from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.layouts import in_column, in_row, wide
@@ -174,7 +174,7 @@ class ExportDialog(QDialog):
                 if codes
             ]
             lacks_co = statuses.get("CO") is Status.TO_DO
-            parts += [CO_IS_COMPUTED] if lacks_co else []
+            parts += [CO_IS_MISSING] if lacks_co else []
             words = f"The {side.word} side has {labels.progress(side).text}" + "".join(
                 f"; {p}" for p in parts
             )

@@ -64,5 +64,5 @@ class TiltRow(QWidget):
         if head.heads:
             return f"The scan contains {len(head.heads)} heads: choose one in 1 Scan > Head."
         if head.refusal:
-            return "The head could not be straightened by itself: 1 Scan > Head shows other ways."
+            return "The head could not be straightened automatically: 1 Scan > Head shows other ways."
         return "Is the head tilted in the scan? The views can be aligned with it."

@@ -57,7 +57,7 @@ class BoneCard(Card):
         )
         self.add(
             text_label(
-                "Thin bone should just close. The slices show the threshold while you drag.",
+                "Lower it until the holes in thin bone just close. The slices follow while you drag.",
                 "hint",
                 wrap=True,
             )

@@ -1,4 +1,4 @@
-"""How the head lies in its scan: straightening it, by itself or with a hand, and which side is left."""
+"""How the head lies in its scan: straightening it, automatically or by hand, and which side is left."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class HeadCard(Card):
         self._heads.setSpacing(6)
         self.add(self._heads)
         self.confirm = action_button(actions["head.confirm_left"], "Left is correct")
-        self.exchanged = action_button(actions["head.left_is_right"], "They are exchanged…")
+        self.exchanged = action_button(actions["head.left_is_right"], "The scan is mirrored…")
         self._answers = _row(self.confirm, self.exchanged)
         self.add(self._answers)
         self.shown = QCheckBox("Views in the head frame")
