@@ -217,7 +217,7 @@ class ImportDialog(QDialog):
                 self._findings.addWidget(self._accept_box(problem, problem.code in accepted))
 
     def _accept_box(self, problem: Problem, checked: bool) -> QCheckBox:
-        box = QCheckBox("It is correct: continue")
+        box = QCheckBox("Accept this and continue")
         box.setChecked(checked)
         box.toggled.connect(self._update_later)
         self.accepts[problem.code] = box
