@@ -382,8 +382,8 @@ def _check_joint(touches: LandmarkSet, specimens: Sequence[Specimen]) -> None:
         raise GpError("it needs labelled animals", remedy="Fit an atlas to them in the step 3 Atlas.")
     lacking = [code for code in ("RWA", "RWP", "LLI") if code not in touches.placed]
     if lacking:
-        remedy = f"Touch {' and '.join(lacking)} too."
-        raise GpError("it starts at the round window, and needs RWA, RWP and LLI", remedy=remedy)
+        what = " and ".join(lacking)
+        raise GpError(f"it starts at the round window and needs {what}", remedy=f"Touch {what} too.")
 
 
 def _registered(
