@@ -63,15 +63,15 @@ class EstimateSettingsCard(Card):
             f"{_SHARED}, mm",
             0.05,
             "0.25",
-            "RMS length of one offset that all touches of the session share: of the tip, the reference "
-            "marker, soft tissue. The touches do not show it. It widens the 95 % region and moves nothing",
+            "RMS length of an offset that all touches share, from the tip, the reference marker or soft "
+            "tissue. Touches cannot show it. It widens the 95 % region, and does not move the estimate",
         )
         self.each = _number(
             _EACH,
             1,
             "9",
-            "How often each feature is asked for. All touches are used, by their mean; three times take some "
-            "30 % off the error of CO where touches are rough",
+            "How often each feature is requested. The estimate uses the mean of its touches: if touches are "
+            "rough, three of each reduce the error of CO by about 30 %",
         )
         self._make_ears()
         self.atlas = ElidedLabel()

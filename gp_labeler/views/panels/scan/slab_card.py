@@ -49,7 +49,9 @@ class SlabCard(Card):
         grid.setColumnStretch(1, 2)
         grid.setColumnStretch(2, 1)
         self.add(grid)
-        self.add(text_label("Display only: values, bone edge and clicks use the slice.", "hint", wrap=True))
+        self.add(
+            text_label("Display only: values, bone edge and clicks use the single slice.", "hint", wrap=True)
+        )
         self.mode.activated.connect(self._on_slab)
         self.thickness.value_chosen.connect(self._on_slab)
         self.denoise.activated.connect(self._on_denoise)
