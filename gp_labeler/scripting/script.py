@@ -165,7 +165,7 @@ def _parsed(text: str, path: Path, file: Path) -> Any:
         toml = importlib.import_module("tomllib" if sys.version_info >= (3, 11) else "tomli")
         return toml.loads(text)
     except ImportError:
-        raise GpError("TOML needs Python 3.11", file=file, remedy="Write the script as JSON.") from None
+        raise GpError("TOML needs tomli on Python 3.10", file=file, remedy="Run pip install tomli.") from None
     except (ValueError, RecursionError) as error:
         kind = "JSON" if path.suffix.lower() == ".json" else "TOML"
         raise GpError(f"is not {kind}: {error}", file=file) from None
