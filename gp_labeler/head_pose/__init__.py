@@ -2,11 +2,18 @@
 
 from gp_labeler.head_pose.by_points import straighten_by_landmarks, straighten_by_points
 from gp_labeler.head_pose.mid_plane import MidPlane
-from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError, SeveralHeadsError
+from gp_labeler.head_pose.result import (
+    LEFT_OF_LANDMARKS,
+    Confidence,
+    HeadPose,
+    HeadPoseError,
+    SeveralHeadsError,
+)
 from gp_labeler.head_pose.straighten import straighten
 from gp_labeler.head_pose.template import HeadTemplate
 
 __all__ = [
+    "LEFT_OF_LANDMARKS",
     "Confidence",
     "HeadPose",
     "HeadPoseError",

@@ -19,7 +19,7 @@ from gp_labeler.head_pose.bone import Bone, bone_of
 from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import agreement_of
-from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError
+from gp_labeler.head_pose.result import LEFT_OF_LANDMARKS, Confidence, HeadPose, HeadPoseError
 from gp_labeler.head_pose.straighten import pose_in_plane
 from gp_labeler.head_pose.template import HeadTemplate, axes_in_plane, front_and_up, phantom_template
 from gp_labeler.imaging.progress import Report
@@ -69,8 +69,14 @@ def straighten_by_landmarks(
     mean, placed, names = _matched(sides)
     left_right = [n for n in names if n != "IN"]
     if not left_right or len(placed) < 3:
+        is_none = not any(landmarks.placed for landmarks in sides.values())
+        few = (
+            "no landmark is placed"
+            if is_none
+            else "landmarks of one side do not determine the pose of the head"
+        )
         raise HeadPoseError(
-            "landmarks of one side do not determine the pose of the head",
+            few,
             file=volume.path,
             remedy="Place IN, and one feature such as OI or MN on both sides.",
         )
@@ -93,7 +99,7 @@ def straighten_by_landmarks(
         "landmarks",
         confidence,
         f"from {', '.join(names)}",
-        "the sides of the landmarks",
+        LEFT_OF_LANDMARKS,
         tuple(warnings),
     )
 

@@ -13,7 +13,10 @@ from gp_core.frames import RigidTransform
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.mid_plane import MidPlane
 
-__all__ = ["Confidence", "HeadPose", "HeadPoseError", "SeveralHeadsError"]
+__all__ = ["LEFT_OF_LANDMARKS", "Confidence", "HeadPose", "HeadPoseError", "SeveralHeadsError"]
+
+LEFT_OF_LANDMARKS = "the sides of the landmarks"
+"""What left is taken from where a head was straightened by its landmarks."""
 
 _REMEDY = (
     "Place IN and a pair such as OI, and straighten by landmarks; or give three points: midline, left, right."

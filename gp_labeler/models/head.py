@@ -20,7 +20,7 @@ from gp_labeler.document.head_frame import HeadFrame
 from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import Position
-from gp_labeler.head_pose import HeadPose, SeveralHeadsError
+from gp_labeler.head_pose import LEFT_OF_LANDMARKS, HeadPose, SeveralHeadsError
 from gp_labeler.imaging.anatomical_frame import letter_of
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.head import Straighten, StraightenByLandmarks, StraightenByPoints
@@ -133,8 +133,9 @@ class HeadModel:
         if self.frame is None:
             return ""
         towards = letter_of(self.frame.T_head_scan.rotation[0])
+        source = self.frame.left if self.frame.left == LEFT_OF_LANDMARKS else "the file"
         return (
-            f"According to the file, left is towards {towards} of the scan; nothing in the scan can prove "
+            f"According to {source}, left is towards {towards} of the scan; nothing in the scan can prove "
             "it, because a head and its mirror image look alike. Check it against a mark on the animal."
         )
 
@@ -369,6 +370,7 @@ class HeadModel:
         left = "" if self.frame is None else self.frame.left
         matrix = HeadFrame.of(T_head_scan).matrix
         head = HeadFrame(matrix, "hand", "by hand", left, self._left_is_known)
+        self.refusal, self.heads = "", ()
         self._document.do(SetHeadFrame(head), merge=merge)
 
     def _on_reset(self) -> None:
@@ -397,7 +399,15 @@ class HeadModel:
     def _on_failed(self, task: Task[Any]) -> None:
         if task.key != _KEY:
             return
-        self.refusal = task.message
+        self.refusal = _without_file(task)
         if isinstance(task.error, SeveralHeadsError):
             self.heads = tuple(as_position(centre, "head") for centre in task.error.centres)
         self.changed.emit()
+
+
+def _without_file(task: Task[Any]) -> str:
+    """Return why a task failed and what to do; the file is the scan that is open."""
+    error = task.error
+    if not isinstance(error, GpError):
+        return task.message
+    return ". ".join(text.rstrip(".") for text in (error.problem, error.remedy) if text) + "."

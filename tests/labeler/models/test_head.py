@@ -16,7 +16,13 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.head_edits import SetHeadFrame
 from gp_labeler.document.specimen_file import read_specimen
 from gp_labeler.document.specimen_json import document_of, state_of
-from gp_labeler.head_pose import Confidence, HeadPose, HeadPoseError, SeveralHeadsError
+from gp_labeler.head_pose import (
+    LEFT_OF_LANDMARKS,
+    Confidence,
+    HeadPose,
+    HeadPoseError,
+    SeveralHeadsError,
+)
 from gp_labeler.imaging.anatomical_frame import SCAN_FRAME
 from gp_labeler.jobs.head import Straighten, StraightenByPoints
 from gp_labeler.models.workspace import Workspace
@@ -171,6 +177,9 @@ def test_a_cancelled_search_changes_nothing(workspace, monkeypatch) -> None:
 
 
 def test_landmarks_of_one_side_are_refused_with_what_to_place(workspace) -> None:
+    workspace.head.straighten_by_landmarks()
+    deliver(workspace)
+    assert workspace.head.refusal.startswith("no landmark is placed. Place IN")
     place(workspace, "CA", "RWP", "OS")
     workspace.head.straighten_by_landmarks()
     deliver(workspace)
@@ -201,6 +210,15 @@ def test_left_is_asked_once_and_the_answer_is_kept(workspace, monkeypatch) -> No
     assert not workspace.head.asks_left
     straightened(workspace, monkeypatch)  # again: left is no other
     assert not workspace.head.asks_left
+
+
+@pytest.mark.parametrize(
+    ("left", "source"),
+    [("the file's orientation (a left-handed grid)", "the file"), (LEFT_OF_LANDMARKS, LEFT_OF_LANDMARKS)],
+)
+def test_the_question_of_left_names_what_left_was_taken_from(workspace, monkeypatch, left, source) -> None:
+    straightened(workspace, monkeypatch, replace(POSE, left=left))
+    assert workspace.head.left_text.startswith(f"According to {source}, left is")
 
 
 def test_a_scan_that_is_read_again_mirrored_is_straightened_again_if_it_was(

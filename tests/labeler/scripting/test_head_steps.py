@@ -44,7 +44,7 @@ def test_the_head_is_turned_by_hand_and_what_is_refused_ends_the_script(tmp_path
     assert turned[0, :3] @ np.array(HEAD.matrix)[0, :3] == pytest.approx(np.cos(np.radians(10)))
     refused = run(tmp_path, {"do": "straighten", "by": "landmarks"})
     assert not refused.ok
-    assert "one side" in refused.error
+    assert "no landmark is placed" in refused.error
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from document_cases import head_frame
-from qtpy.QtWidgets import QPushButton
+from qtpy.QtCore import Qt
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QLabel, QPushButton
 from window_cases import wait_until_idle
 
 from gp_labeler.document.head_edits import SetHeadFrame
@@ -37,6 +39,10 @@ def refuse(error):
 
 def heads_in(card):
     return [b for b in card.findChildren(QPushButton) if b.isVisible() and b.text().startswith("Head ")]
+
+
+def notices_in(card):
+    return [label.text() for label in card.findChildren(QLabel) if label.isVisible()]
 
 
 def test_a_new_scan_is_offered_to_be_straightened_until_it_is_or_is_labelled(qtbot, window, monkeypatch):
@@ -82,3 +88,30 @@ def test_of_several_heads_the_card_offers_each(qtbot, window, monkeypatch):
     np.testing.assert_allclose(window.workspace.view.crosshair, HEADS[1], atol=0.2)
     assert window.workspace.head.frame is not None
     assert not heads_in(card)
+
+
+def test_the_keyboard_stays_with_the_button_that_began_the_search(qtbot, window, monkeypatch):
+    monkeypatch.setattr(Straighten, "run", lambda job, progress: POSE)
+    window.set_step("scan")
+    card = window.findChild(HeadCard)
+    card.straighten.setFocus()
+    QTest.keyClick(card.straighten, Qt.Key.Key_Space)
+    assert card.stop.hasFocus()
+    wait_until_idle(qtbot, window)
+    assert card.straighten.hasFocus()
+    card.confirm.setFocus()
+    QTest.keyClick(card.confirm, Qt.Key.Key_Space)
+    assert not card.confirm.isVisible()
+    assert card.straighten.hasFocus()
+
+
+def test_a_head_that_is_turned_by_hand_is_refused_no_more(qtbot, window, monkeypatch):
+    monkeypatch.setattr(Straighten, "run", refuse(HeadPoseError("only 40 % agrees", file="/scans/a.nrrd")))
+    head, card = window.workspace.head, window.findChild(HeadCard)
+    window.set_step("scan")
+    card.straighten.click()
+    wait_until_idle(qtbot, window)
+    said = notices_in(card)
+    assert any(words.startswith("Only 40 % agrees. Place IN") for words in said)  # the file is the open one
+    head.turn("roll", 0.2)
+    assert "40 %" not in " ".join(notices_in(card))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from qtpy.QtCore import QTimer
-from qtpy.QtWidgets import QCheckBox, QPushButton, QToolButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QApplication, QCheckBox, QPushButton, QToolButton, QVBoxLayout, QWidget
 
 from gp_labeler.document.state import Position
 from gp_labeler.models.head import FREE_POINTS
@@ -77,14 +77,23 @@ class HeadCard(Card):
         self.refresh()
 
     def refresh(self, *_: object) -> None:
-        """Show how the head lies now."""
+        """Show how the head lies now; the keyboard stays where the search is begun and stopped."""
+        focus = QApplication.focusWidget()
+        own = focus if focus is not None and self.isAncestorOf(focus) else None
+        self._show_state()
+        is_running = self._workspace.head.is_running
+        if own is not None and (is_running or not own.isVisible()):
+            self.straighten.setEnabled(not is_running)  # as its action will be in the next turn
+            (self.stop if is_running else self.straighten).setFocus()
+
+    def _show_state(self) -> None:
         workspace, head = self._workspace, self._workspace.head
         self.setVisible(workspace.scan.volume is not None)
         self.state.setText(head_text(workspace))
         emptied(self._notices)
         self._offer_heads()
         if head.refusal and not head.heads:
-            self._notices.addWidget(Notice("warning", head.refusal))
+            self._notices.addWidget(Notice("warning", sentence(head.refusal)))
         for warning in head.warnings:
             self._notices.addWidget(Notice("warning", sentence(warning)))
         wrong = head.wrong_sides()
