@@ -83,6 +83,7 @@ class StatusLine(QWidget):
         self.without_scan = ""
         self._message_timer = QTimer(self, singleShot=True)
         self._message_timer.timeout.connect(self._say_next)
+        self._just_warned = QTimer(self, singleShot=True, interval=0)
         for signal in (
             workspace.document.landmarks_changed,
             workspace.labels.active_changed,
@@ -130,12 +131,17 @@ class StatusLine(QWidget):
         text = capitalised(f"{_SIGNS[level]}{text}")
         announce(self.next_click, text, urgent=level != "info")
         self._show(breakable(text), {"info": "good"}.get(level, "danger" if level == "error" else level))
+        if level == "warning":
+            self._just_warned.start()
         if _MESSAGE_MS[level]:
             self._message_timer.start(_MESSAGE_MS[level])
         else:
             self._message_timer.stop()
 
     def _on_changed(self, *_: object) -> None:
+        """Say what comes next, but leave what the same click has just warned of."""
+        if self._just_warned.isActive():
+            return
         self._message_timer.stop()
         self._say_next()
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from document_cases import head_frame
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, on_ball, wait_until_idle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, on_ball, one_turn, wait_until_idle
 
 from gp_core.landmarks.features import Side
+from gp_labeler.document.head_edits import SetHeadFrame
 from gp_labeler.document.state import How
 from gp_labeler.models.workflow import Active
 from gp_labeler.scene.planes import Plane
@@ -68,6 +70,21 @@ def test_a_click_on_a_slice_places_on_it(window, plane) -> None:
     QTest.mouseClick(view, LEFT_BUTTON, pos=pixel(view, known))
     assert np.abs(placed(window) - known).max() < VOXEL_MM
     assert window.workspace.document.state.landmark(Side.LEFT, "CA").provenance.how is How.SLICE
+
+
+def test_a_warning_of_the_wrong_side_is_read_though_the_next_feature_is_asked_for(window) -> None:
+    view, says = window.grid.slice_views[Plane.AXIAL], window.status.next_click
+    window.workspace.view.set_crosshair(MIDDLE)
+    window.workspace.document.do(SetHeadFrame(head_frame((0, 0, 0), MIDDLE)))
+    one_turn()
+    QTest.mouseClick(view, LEFT_BUTTON, pos=pixel(view, MIDDLE - THREE_LEFT))
+    assert window.workspace.labels.active.code != "CA"
+    assert "on the right of the mid-plane" in says.text()
+    one_turn()
+    assert "on the right of the mid-plane" in says.text()
+    QTest.mouseClick(view, LEFT_BUTTON, pos=pixel(view, MIDDLE + THREE_LEFT))
+    one_turn()
+    assert says.text().startswith("Click on bone or a slice to place")
 
 
 def test_left_is_on_the_right_of_the_screen(window) -> None:
