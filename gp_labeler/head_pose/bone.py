@@ -56,6 +56,9 @@ _FEWEST_NOISY = 0.1
 _RING_VOXELS = 8.0
 """How far around a voxel its slice tells what it would be without a ring, or a wider shade."""
 
+_EDGE_VOXELS = 1.0
+"""How near to the edge of the scan bone is cut by it."""
+
 _FEWEST_VOXELS = 500
 _TAILS_PERCENT = (0.5, 99.9)
 _SAMPLES = 500_000
@@ -371,6 +374,13 @@ class Bone:
         """Root mean square distance from the centroid, mm."""
         axes = self.scan.T_scan_index[:3, :3]
         return float(np.sqrt(np.trace(axes @ np.cov(self.index.T, bias=True) @ axes.T)))
+
+    @cached_property
+    def share_at_edge(self) -> float:
+        """How much of its surface lies at the edge of what the scanner measured: of a cropped head, not 0."""
+        around = np.concatenate([np.eye(3), -np.eye(3)]) @ self.scan.T_scan_index[:3, :3].T
+        is_inside = [self.scan.inside(self.points + _EDGE_VOXELS * step) for step in around]
+        return float(1 - np.all(is_inside, axis=0).mean())
 
     @cached_property
     def thickness(self) -> float:

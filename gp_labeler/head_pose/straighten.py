@@ -43,6 +43,9 @@ _PART = (0.82, 0.4, 0.1)
 _CLEAR = (0.58, 0.6, 0.2)
 """The same where no other plane comes near: some of the head may be missing, or bone be ragged."""
 
+_LEAST_CUT = 0.02
+"""Share of the surface of a cropped head that lies at the edge of the scan, at least; 0.04 to 0.25 mostly."""
+
 _GAIN, _LATE_GAIN = 0.15, 0.04
 """By how much the fit of grey values raises agreement, overlap or margin at most, and the whole fit after the
 quick one; what is farther behind is left."""
@@ -69,9 +72,17 @@ class _Found:
         """Whether a fit that raises each figure by so much will not make it acceptable either."""
         return not self._passes(gain)
 
+    @property
+    def may_be_several(self) -> bool:
+        """Whether much of the bone has no mirror image in the scan, though the scan's edge cuts no bone."""
+        return self._lacks_an_image(0.0)
+
+    def _lacks_an_image(self, slack: float) -> bool:
+        return self.confidence.overlap + slack < _WHOLE[1] and self.bone.share_at_edge < _LEAST_CUT
+
     def _passes(self, slack: float) -> bool:
         c = self.confidence
-        return any(
+        return not self._lacks_an_image(slack) and any(
             c.agreement + slack >= agreement and c.overlap + slack >= overlap and c.margin + slack >= margin
             for agreement, overlap, margin in (_WHOLE, _PART, _CLEAR)
         )
@@ -287,7 +298,12 @@ def _leading(bone: Bone, judged: list[tuple[Agreement, MidPlane]]) -> _Found:
 
 def _why(found: _Found) -> str:
     c = found.confidence
-    if c.overlap < _WHOLE[1]:
+    if found.may_be_several:
+        reason = (
+            f"{100 * (1 - c.overlap):.0f} % of the bone has no mirror image in the scan, though the edge of "
+            "the scan cuts no bone: there may be more than one head"
+        )
+    elif c.overlap < _WHOLE[1]:
         reason = f"only {100 * c.overlap:.0f} % of the bone has a mirror image within the scan"
     elif c.agreement < _WHOLE[0]:
         reason = f"only {100 * c.agreement:.0f} % of the bone meets its mirror image"

@@ -185,6 +185,33 @@ def test_of_two_heads_none_is_chosen_until_somebody_says_which_one_is_meant():
     np.testing.assert_allclose(pose.T_head_scan.rotation, found().T_head_scan.rotation, atol=0.05)
 
 
+def joined_heads():
+    """Return a scan of two heads that a bar as bright as bone joins, and of one with that bar."""
+    scan, _ = two_heads()
+    values = scan.array.copy()
+    nz, ny, nx = (n // 2 for n in values.shape)
+    values[nz - 4 : nz + 4, ny - 4 : ny + 4, nx // 2 : 3 * nx // 2] = 30_000
+    return Volume(values, scan.T_scan_voxel), Volume(values[:, :, :nx], scan.T_scan_voxel)
+
+
+def test_two_heads_that_a_bar_joins_are_not_taken_for_a_cropped_one():
+    both, one = joined_heads()
+    with pytest.raises(HeadPoseError, match=r"may be more than one head.*IN and a pair"):
+        straighten(both)
+    pose = straighten(one)
+    assert pose.mid_plane.angle_to_deg(true_plane(head(names=USUAL))) < 0.6
+
+
+def test_a_head_of_which_the_edge_of_the_scan_cuts_off_one_side_is_one_head():
+    turn = (10.0, 25.0, 0.0)
+    whole, cut = head(22, USUAL, turn=turn), head(22, USUAL, turn=turn, crop=(0.2, "L"))
+    assert Bone.islands(coarse_scan(whole.volume, 1.0), 14_000)[0].share_at_edge == 0
+    assert Bone.islands(coarse_scan(cut.volume, 1.0), 14_000)[0].share_at_edge > 0.03
+    pose = straighten(cut.volume)
+    assert pose.confidence.overlap < 0.7
+    assert errors(pose, cut)[0] < 2.5
+
+
 def test_a_large_thing_beside_the_head_is_spoken_of():
     volume = head(names=USUAL).volume
     middle = np.array(volume.array.shape) / 2 + (0.3, 0.7, 0.45)  # no plane of the voxels is one of the ball
