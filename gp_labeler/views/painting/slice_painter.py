@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from qtpy.QtCore import QPointF, QRectF, Qt
-from qtpy.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPixmap
+from qtpy.QtCore import QPointF, QRectF
+from qtpy.QtGui import QColor, QImage, QPainter, QPen, QPixmap
 
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.anatomical_frame import AnatomicalFrame
@@ -28,7 +28,7 @@ from gp_labeler.views.filter_words import filter_words
 from gp_labeler.views.fonts import TEXT, text_scale
 from gp_labeler.views.painting.marks import paint_mark
 from gp_labeler.views.painting.name_tags import NameTag, paint_words, place_names
-from gp_labeler.views.painting.qt_paths import polygon, segments_path
+from gp_labeler.views.painting.qt_paths import draw_segments, polygon
 from gp_labeler.views.painting.scale_bar import paint_scale_bar
 from gp_labeler.views.painting.slice_lines import paint_lines
 from gp_labeler.views.painting.word_pictures import word_picture
@@ -93,7 +93,7 @@ class SlicePainter:
         self._where: _Where | None = None
         self._filtered: tuple[object, SliceImage] | None = None
         self._picture: tuple[object, QImage] | None = None
-        self._outline: tuple[object, QPainterPath] | None = None
+        self._outline: tuple[object, FloatArray] | None = None
         self._ground: tuple[SliceViewport, VolumeSlicer, object, QPixmap] | None = None
         self._points: SlicePoints | None = None
         follow(view, workspace.scan.threshold_previewed, self._on_preview)
@@ -109,7 +109,10 @@ class SlicePainter:
     @property
     def outline_length(self) -> float:
         """How long the edge of bone is that was painted last, mm; 0 where none is."""
-        return 0.0 if self._outline is None else float(self._outline[1].length())
+        if self._outline is None:
+            return 0.0
+        start, end = self._outline[1].swapaxes(0, 1)
+        return float(np.linalg.norm(end - start, axis=1).sum())
 
     def forget(self) -> None:
         """Let go of the pictures."""
@@ -248,7 +251,7 @@ class SlicePainter:
             self._outline = None
             return
         if self._outline is None or self._outline[0] != threshold:
-            self._outline = (threshold, segments_path(self._slice.outline(threshold)))
+            self._outline = (threshold, self._slice.outline(threshold))
         pen = QPen(QColor(246, 190, 110, 190), max(1.0, ratio))
         pen.setCosmetic(True)
         painter.save()
@@ -256,8 +259,7 @@ class SlicePainter:
         painter.translate(*corner.tolist())
         painter.scale(1 / shown.mm_per_pixel, 1 / shown.mm_per_pixel)
         painter.setPen(pen)
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.drawPath(self._outline[1])
+        draw_segments(painter, self._outline[1])
         painter.restore()
 
     def _paint_crosshair(self, painter: QPainter, shown: SliceViewport, theme: Theme, ratio: float) -> None:
