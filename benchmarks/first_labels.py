@@ -9,8 +9,12 @@ simulated user sees each feature where it truly is, and knows where to look:
 - *without*, the user takes the features in the order that the window proposes. From the third on, ghosts say
   where to look. In the view in which the feature is best seen (axial for what is best seen in 3D), the user
   turns the wheel to the feature's slice, zooms in until a voxel is four pixels wide, and clicks.
-- *with*, the user asks for suggestions. Each that is off by more than a voxel is corrected in the same way,
-  with Ctrl held for the click; the others are confirmed by Enter.
+- *one by one*, the user asks for suggestions. Each that is off by more than a voxel is corrected in the same
+  way, with Ctrl held for the click; the others are confirmed by Enter.
+- *in pages*, the user checks the same suggestions in pages of close views, and corrects there what is off by
+  more than a voxel: a click with Ctrl held, in a picture that goes through a place within a voxel of the
+  feature, or after a turn of the wheel. Where the feature lies beside both pictures, a click marks the
+  suggestion. Enter confirms the others. What is left, also what is doubtful and right, comes up one by one.
 
 Each key, click and notch of the wheel is an action. A stroke is a turn of the wheel without a pause. Memory
 is that of the window and of its process for registration, pages that both hold counted once (Linux).
@@ -40,18 +44,22 @@ import numpy as np  # noqa: E402
 from gp_core.errors import GpError  # noqa: E402
 from gp_core.io import load_specimens  # noqa: E402
 from gp_core.landmarks.features import FEATURES, Side, feature  # noqa: E402
+from gp_labeler.document.state import How  # noqa: E402
 from gp_labeler.scene.planes import Plane  # noqa: E402
 from gp_labeler.scripting.events import click, press_keys, turn_wheel  # noqa: E402
+from gp_labeler.scripting.page_correction import pointing_at  # noqa: E402
 from gp_labeler.scripting.steps.first_labels import PATIENCE_SECONDS  # noqa: E402
 from gp_labeler.scripting.steps.scan import Open  # noqa: E402
 from gp_labeler.scripting.window_driver import WindowDriver  # noqa: E402
+from gp_labeler.views.panels.label.close_view_tile import CloseViewTile  # noqa: E402
 from gp_labeler.views.panels.label.suggest_row import SuggestRow  # noqa: E402
+from gp_labeler.views.panels.label.suggestion_page_dialog import SuggestionPageDialog  # noqa: E402
 from gp_labeler.views.window_commands.landmarks import AS_THE_FILE, FOLDER  # noqa: E402
 
 _SLICES = tuple(plane.value for plane in Plane)
 _VOXEL_PIXELS = 4.0
 _ZOOM_PER_NOTCH = 1.15
-_MOST = 200
+_MOST, _TRIES = 200, 3
 CODES = [row.code for row in FEATURES if not row.computed]
 
 
@@ -67,21 +75,22 @@ class Hand:
         view = self.driver.view("axial")
         view.setFocus()
         press_keys(view, keys)
-        self._rest("keys")
+        self.rest("keys")
 
     def click(self, widget, x: float, y: float, *, ctrl: bool = False) -> None:
         """Click with the left button."""
         click(widget, x, y, ctrl=ctrl)
-        self._rest("clicks")
+        self.rest("clicks")
 
     def wheel(self, widget, x: float, y: float, notches: int, *, ctrl: bool = False) -> None:
         """Turn the wheel; every notch counts, and every stroke."""
         if notches:
             turn_wheel(widget, x, y, notches, ctrl=ctrl)
-            self._rest("notches", abs(notches))
+            self.rest("notches", abs(notches))
             self.done["strokes"] += 1
 
-    def _rest(self, kind: str, n: int = 1) -> None:
+    def rest(self, kind: str, n: int = 1) -> None:
+        """Count what was done, and wait until it is drawn."""
         self.done[kind] += n
         self.driver.wait_until_idle(in_passing=False)
 
@@ -207,31 +216,94 @@ def cpu_seconds() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-def with_first_labels(driver: WindowDriver, head: Path, library: Path) -> Labelled:
-    """Label a head that has first labels."""
+def one_by_one(hand: Hand) -> int:
+    """Confirm or correct all suggestions as they come up; return how many were confirmed."""
+    driver, n_confirmed = hand.driver, 0
+    for _ in range(_MOST):
+        active = driver.workspace.labels.active
+        if active.code is None or not any(
+            driver.workspace.document.landmarks(side).suggested for side in Side
+        ):
+            break
+        if is_within_a_voxel(driver, active.side, active.code):
+            hand.key("Return")
+            n_confirmed += driver.placed(active.side, active.code) is not None
+        else:
+            hand.place(active.code, driver.truth(active.side, active.code), replace=True)
+    return n_confirmed
+
+
+def in_pages(hand: Hand) -> int:
+    """Check all suggestions in pages, then what is left one by one; return how many the pages confirmed."""
+    driver, pages = hand.driver, hand.driver.workspace.pages
+    button = driver.window.findChild(SuggestRow).check
+    hand.click(button, button.width() / 2, button.height() / 2)
+    (dialog,) = driver.window.findChildren(SuggestionPageDialog)
+    for _ in range(pages.n_pages):
+        driver.wait_until_idle(in_passing=False)
+        for tile in dialog.shown_tiles:
+            dialog.area.ensureWidgetVisible(tile)
+            driver.app.processEvents()
+            if not is_within_a_voxel(driver, tile.entry.side, tile.entry.code):
+                correct(hand, tile)
+        press_keys(dialog.shown_tiles[0], "Return")
+        hand.rest("keys")
+    driver.window.activateWindow()  # as a desktop does once the dialog has closed
+    driver.wait_until_idle()
+    marks = driver.workspace.document.state.landmarks.values()
+    hows = Counter(mark.provenance.how for mark in marks if mark.position is not None and mark.provenance)
+    hand.done["on a page"] = hows[How.CORRECTED]
+    one_by_one(hand)
+    return hows[How.PAGE]
+
+
+def correct(hand: Hand, tile: CloseViewTile) -> None:
+    """Point at a feature in its close view until it is within a voxel, or mark its suggestion."""
+    entry, driver = tile.entry, hand.driver
+    aim = driver.truth(entry.side, entry.code)
+    for _ in range(_TRIES):
+        how = pointing_at(driver.workspace.pages, tile.entry, aim, driver.voxel)
+        if how is None:
+            break
+        pixel = tile.pixel_of_place(how.number, how.across, how.down)
+        hand.wheel(tile, *pixel, how.n_notches)
+        hand.click(tile, *pixel, ctrl=True)
+        placed = driver.placed(entry.side, entry.code)
+        if placed is not None and np.linalg.norm(placed - aim) <= driver.voxel:
+            return
+    if tile.entry.is_offered:
+        hand.click(tile, tile.width() / 2, tile.height() / 2)
+
+
+def is_within_a_voxel(driver: WindowDriver, side: Side, code: str) -> bool:
+    """Whether a feature is suggested, and that no farther than a voxel from where it is."""
+    found = driver.workspace.document.landmarks(side).suggested.get(code)
+    truth = driver.truth(side, code)
+    return found is not None and np.linalg.norm(np.array(found.position) - truth) <= driver.voxel
+
+
+def with_first_labels(driver: WindowDriver, head: Path, library: Path) -> tuple[Labelled, Labelled]:
+    """Label a head that has first labels, one by one and then, from the same suggestions, in pages."""
     hand = open_head(driver, head)
     cpu, memory = suggest(hand, library)
+    document, before = driver.workspace.document, Counter(hand.done)
+    suggested_alone = document.state
     suggested = np.array(
         [
             np.linalg.norm(np.array(found.position) - driver.truth(side, code))
             for side in Side
-            for code, found in driver.workspace.document.landmarks(side).suggested.items()
+            for code, found in document.landmarks(side).suggested.items()
             if not (side is Side.RIGHT and code == "IN")
         ]
     )
-    n_confirmed = 0
-    for _ in range(_MOST):
-        active = driver.workspace.labels.active
-        if active.code is None:
-            break
-        truth = driver.truth(active.side, active.code)
-        found = driver.workspace.document.landmarks(active.side).suggested.get(active.code)
-        if found is None or np.linalg.norm(np.array(found.position) - truth) > driver.voxel:
-            hand.place(active.code, truth, replace=True)
-        else:
-            hand.key("Return")
-            n_confirmed += driver.placed(active.side, active.code) is not None
-    return Labelled(hand.done, errors_of(driver), n_confirmed, suggested, cpu, memory)
+    n_confirmed = one_by_one(hand)
+    single = Labelled(hand.done, errors_of(driver), n_confirmed, suggested, cpu, memory)
+    while document.state != suggested_alone and document.undo():
+        pass
+    driver.wait_until_idle()
+    hand = Hand(driver, before)
+    n_confirmed = in_pages(hand)
+    return single, Labelled(hand.done, errors_of(driver), n_confirmed, suggested, cpu, memory)
 
 
 def tell(name: str, found: Labelled) -> None:
@@ -294,18 +366,22 @@ def report(driver: WindowDriver, head: Path, library: Path) -> None:
     started, name = time.monotonic(), head.stem.removeprefix("phantom-")
     bare = without(driver, head)
     tell(f"{name} without", bare)
-    helped = with_first_labels(driver, head, library)
-    tell(f"{name} with", helped)
-    assert helped.suggested is not None
-    within = int((helped.suggested <= driver.voxel).sum())
+    single, paged = with_first_labels(driver, head, library)
+    assert single.suggested is not None
+    within = int((single.suggested <= driver.voxel).sum())
     print(
-        f"{'':<16}{within} of {len(helped.suggested)} suggestions within a voxel (median "
-        f"{np.median(helped.suggested):.3f} mm, most {helped.suggested.max():.2f}), "
-        f"{helped.n_confirmed} confirmed; all actions {every(helped) / every(bare):.2f} of those without, "
-        f"presses {presses(helped) / presses(bare):.2f}; suggesting took {helped.cpu:.0f} CPU s, "
-        f"{helped.memory}; {time.monotonic() - started:.0f} s",
-        flush=True,
+        f"{'':<16}{within} of {len(single.suggested)} suggestions within a voxel (median "
+        f"{np.median(single.suggested):.3f} mm, most {single.suggested.max():.2f}); suggesting took "
+        f"{single.cpu:.0f} CPU s, {single.memory}; {time.monotonic() - started:.0f} s"
     )
+    for how, found in (("one by one", single), ("in pages", paged)):
+        tell(f"{name} {how}", found)
+        print(
+            f"{'':<16}{found.n_confirmed} confirmed, {found.done['on a page']} corrected on a page; all "
+            f"actions {every(found) / every(bare):.2f} of those without, presses "
+            f"{presses(found) / presses(bare):.2f}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -130,4 +130,13 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
                 ("Double click", "Maximise or restore"),
             ),
         ),
+        (
+            "On a page of close views",
+            (
+                ("Ctrl+click", "Correct the suggestion"),
+                ("Wheel", "Next and previous slice"),
+                ("Click, Space", "Look at it in the views"),
+                ("Enter", "Confirm the others"),
+            ),
+        ),
     )

@@ -63,6 +63,7 @@ class How(str, Enum):
     GHOST = "accepted ghost"
     CONFIRMED = "confirmed suggestion"
     PAGE = "confirmed from a page"
+    CORRECTED = "corrected on a page"
     NUDGED = "nudged suggestion"
     IMPORTED = "imported"
     TYPED = "typed"

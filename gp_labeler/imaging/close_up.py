@@ -83,13 +83,25 @@ class CloseUp:
         Width of the pictures.
     pixels : int
         Along each side of them.
+    only : PictureAxes, optional
+        Look of the one slice that is wanted: then, no voxels beside it are read, and `slice` is quick.
     """
 
-    def __init__(self, volume: Volume, centre: ArrayLike, across_mm: float, pixels: int) -> None:
+    def __init__(
+        self,
+        volume: Volume,
+        centre: ArrayLike,
+        across_mm: float,
+        pixels: int,
+        *,
+        only: PictureAxes | None = None,
+    ) -> None:
         self._volume, self._pixels = volume, pixels
         self._centre = np.asarray(centre, dtype=np.float64)
         self._step = across_mm / pixels
         half = np.full(3, max(across_mm / 2, _BEFORE_MM, _BEHIND_MM))
+        if only is not None:
+            half = across_mm / 2 * (np.abs(only.right) + np.abs(only.down))
         self._box, self._first, self._stride = _box(volume, self._centre, half)
 
     def slice(self, axes: PictureAxes) -> NDArray[np.float32]:
@@ -101,6 +113,17 @@ class CloseUp:
         """Return bone as seen by someone who looks that way, (pixels, pixels) from 0 (none) to 1 (bright).
 
         Bone that hides the place is cut away just before it. It is drawn at two thirds of the resolution.
+        """
+        return self.shaded(self.bone_depths(axes, threshold))
+
+    def shaded(self, depths: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the picture, as `bone` does, of what `bone_depths` found."""
+        return _enlarged(_shaded(depths, self._step * self._pixels / len(depths)), self._pixels)
+
+    def bone_depths(self, axes: PictureAxes, threshold: float) -> NDArray[np.float32]:
+        """Return how far behind the place the bone lies that `bone` shows, (n, n), mm; NaN where it has none.
+
+        The n pixels along each side are two thirds of those of a slice.
         """
         n = self._pixels * 2 // 3
         step = self._step * self._pixels / n
@@ -115,7 +138,7 @@ class CloseUp:
             layers = np.concatenate([before[open_rays][None], values.reshape(len(part), -1)])
             found[open_rays] = _first_crossings(layers, part, threshold)
             before[open_rays] = layers[-1]
-        return _enlarged(_shaded(found.reshape(n, n), step), self._pixels)
+        return found.reshape(n, n)
 
     def _start(self, axes: PictureAxes, threshold: float) -> float:
         """Return where to begin, mm along the axes: far off, or just before a place that is hidden."""

@@ -164,6 +164,11 @@ class Volume:
         )
         return moved
 
+    def step_along(self, direction: ArrayLike) -> float:
+        """Return how long a step of one voxel is in a (3,) unit direction, mm."""
+        in_voxels = self.direction.T @ np.asarray(direction) / self.spacing
+        return 1.0 / float(np.linalg.norm(in_voxels))
+
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Return for (N, 3) LPS mm points whether each lies in a voxel; missing points do not."""
         index = self.scan_to_voxel(points)

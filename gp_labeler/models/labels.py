@@ -183,12 +183,13 @@ class LabelsModel:
         position: ArrayLike,
         how: How = How.MESH,
         *,
+        source: str = "",
         side: Side | str | None = None,
         code: str | None = None,
     ) -> bool:
         """Put a point at `position`, (3,) mm in the scan frame; a new one makes the next point active.
 
-        ``How.GHOST`` only suggests it: nobody has looked.
+        ``How.GHOST`` only suggests it: nobody has looked. `source` says what had suggested another place.
 
         Returns
         -------
@@ -199,10 +200,8 @@ class LabelsModel:
         if how is How.GHOST:  # as scripts of earlier versions have it
             return self.suggest(position, source="atlas", side=side, code=code)
         is_new = self.document.state.landmark(side, code).position is None
-        where = as_position(position, code)
-        edit = PlacePoint(
-            side, code, where, self.document.provenance(how), verb="place" if is_new else "move"
-        )
+        where, about = as_position(position, code), self.document.provenance(how, source=source)
+        edit = PlacePoint(side, code, where, about, verb="place" if is_new else "move")
         changed = self.document.do(edit)
         self._last = Active(side, code)
         if is_new:

@@ -1,21 +1,24 @@
-"""Checking suggestions in pages of close views: what a page shows, and which of it Enter confirms."""
+"""Suggestions in pages of close views: what a page shows, what Enter confirms, and what a click corrects."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+
+import numpy as np
 
 from gp_core.constants import CHI2_3_95
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import FloatArray
 from gp_labeler.document.edits import point_text
 from gp_labeler.document.page_confirmation import ConfirmPage, page_refusal
 from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
-from gp_labeler.document.state import How
-from gp_labeler.jobs.close_views import CloseView, DrawCloseViews, PointToDraw
+from gp_labeler.document.state import How, Landmark, Position
+from gp_labeler.jobs.close_views import PLANES, ClosePicture, DrawCloseViews, PictureToDraw, looks_of
 from gp_labeler.jobs.runner import Jobs
 from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.messages import Messages
@@ -28,7 +31,10 @@ __all__ = ["PAGE_SIZE", "PageEntry", "SuggestionPagesModel"]
 PAGE_SIZE = 9
 """Close views on one page, at most."""
 
-_KEY = "close views"
+_KEY, _SCROLL_KEY = "close views", "close view of another slice"
+_THIN_MM = 0.01
+"""A place that lies farther off a slice is not in it."""
+
 _SD_PER_RADIUS = CHI2_3_95**-0.5
 """Standard deviation of one coordinate over the 95 % radius, of a Gaussian error in three dimensions."""
 
@@ -41,19 +47,59 @@ class PageEntry:
     ----------
     side : Side
     code : str
-    suggestion : Suggestion, optional
-        None once a person has decided.
+    landmark : Landmark
+        What is known of it: a suggestion, or what a person has decided.
     is_marked : bool
         Whether somebody wants to look at it in the views.
-    close_view : CloseView, optional
-        None until it is drawn.
+    pictures : tuple of ClosePicture
+        The two of its close view; empty until they are drawn. Each stays until the next one is drawn.
     """
 
     side: Side
     code: str
-    suggestion: Suggestion | None = None
+    landmark: Landmark
     is_marked: bool = False
-    close_view: CloseView | None = None
+    pictures: tuple[ClosePicture, ...] = ()
+
+    @property
+    def suggestion(self) -> Suggestion | None:
+        """None once a person has decided."""
+        return self.landmark.suggestion
+
+    @property
+    def position(self) -> Position | None:
+        """Where it is suggested, or placed by now, mm, scan frame; None where it cannot be seen."""
+        return self.landmark.shown_position
+
+    @property
+    def is_corrected(self) -> bool:
+        """Whether a person has placed it on a page."""
+        about = self.landmark.provenance
+        return self.landmark.decided and about is not None and about.how is How.CORRECTED
+
+    @property
+    def shows_its_place(self) -> bool:
+        """Whether both pictures are drawn, and go through the place: neither is scrolled away."""
+        return bool(self.pictures) and all(each.centre == self.position for each in self.pictures)
+
+    def place_in(self, number: int) -> tuple[float, float]:
+        """Return where a picture shows its place: across and down, 0 to 1 of the picture's width."""
+        picture = self.pictures[number]
+        return picture.place_of(picture.centre if self.position is None else self.position)
+
+    def mm_off_slice(self, number: int) -> float:
+        """Return how far a picture's slice lies from its place, mm; 0 where it does not, and for bone."""
+        picture = self.pictures[number]
+        if picture.depths is not None or self.position is None:
+            return 0.0
+        away = abs(picture.depth_of(self.position))
+        return away if away > _THIN_MM else 0.0
+
+    def radius_in(self, number: int) -> float:
+        """Return the 95 % radius, 0 to 1 of a picture's width; 0 where none is known, or beside the slice."""
+        if self.suggestion is None or self.suggestion.radius_95 is None or self.mm_off_slice(number):
+            return 0.0
+        return float(self.suggestion.radius_95 / self.pictures[number].across_mm)
 
     @property
     def name(self) -> str:
@@ -79,7 +125,7 @@ class PageEntry:
 
 
 class SuggestionPagesModel:
-    """Shows suggestions in pages, the least certain first, and confirms what of a page was shown.
+    """Shows suggestions in pages, the least certain first; confirms what was shown, corrects what is wrong.
 
     Parameters
     ----------
@@ -116,7 +162,8 @@ class SuggestionPagesModel:
         self._pages: tuple[tuple[Active, ...], ...] = ()
         self._marked: set[Active] = set()
         self._shown: dict[Active, Suggestion] = {}
-        self._drawn: dict[PointToDraw, CloseView] = {}
+        self._drawn: dict[tuple[Active, int], ClosePicture] = {}
+        self._scrolled: dict[tuple[Active, int], float] = {}
         self._frame = view.frame
         self.number = 0
         """Which page is shown, from 0."""
@@ -155,7 +202,8 @@ class SuggestionPagesModel:
             (sum(entry.is_offered for entry in entries), "to confirm"),
             (sum(entry.is_marked and entry.suggestion is not None for entry in entries), "marked"),
             (sum(bool(entry.refusal) and not entry.is_marked for entry in entries), "doubtful"),
-            (sum(entry.suggestion is None for entry in entries), "decided"),
+            (sum(entry.is_corrected for entry in entries), "corrected"),
+            (sum(entry.suggestion is None and not entry.is_corrected for entry in entries), "decided"),
         )
         told = [f"{n} {words}" for n, words in counts if n]
         return " · ".join([f"Page {self.number + 1} of {max(self.n_pages, 1)}", *told])
@@ -176,7 +224,7 @@ class SuggestionPagesModel:
         if not suggested:
             raise GpError("nothing is suggested", remedy="Suggest landmarks from your scans first.")
         self._pages, self.number = _in_pages(suggested), 0
-        self._marked, self._shown = set(), {}
+        self._marked, self._shown, self._scrolled = set(), {}, {}
         self._draw()
         self.changed.emit()
 
@@ -189,8 +237,77 @@ class SuggestionPagesModel:
 
     def take_shown(self, entry: PageEntry) -> None:
         """Take down that the close view of an entry was on the screen as a whole."""
-        if entry.close_view is not None and entry.suggestion is not None:
+        if entry.shows_its_place and entry.suggestion is not None:
             self._shown[Active(entry.side, entry.code)] = entry.suggestion
+
+    def scroll(self, side: Side | str, code: str, number: int, n_slices: float) -> bool:
+        """Turn one picture of a close view to another slice, as the wheel does in the views.
+
+        Parameters
+        ----------
+        side : Side or str
+        code : str
+        number : int
+            Which picture, 0 or 1.
+        n_slices : float
+            How many voxels further: left, posterior or superior in the frame of the views.
+
+        Returns
+        -------
+        bool
+            False for bone, which has no slices.
+        """
+        point = Active(Side.parse(side), code)
+        if self._step(point, number) is None:
+            return False
+        self._scrolled[point, number] = self._n_scrolled(point, number) + n_slices
+        self._submit(tuple(each for each in self._lacking([point]) if each.number == number), _SCROLL_KEY)
+        self.changed.emit()
+        return True
+
+    def slices_to(self, side: Side | str, code: str, number: int, position: FloatArray) -> float:
+        """Return how many slices a (3,) scan position, mm, lies from the picture's own; 0 for bone."""
+        point = Active(Side.parse(side), code)
+        step, place = self._step(point, number), self._entry(point).position
+        if step is None or place is None:
+            return 0.0
+        return float((position - np.array(place)) @ step / (step @ step)) - self._n_scrolled(point, number)
+
+    def correct(self, side: Side | str, code: str, number: int, across: float, down: float) -> bool:
+        """Place a feature where a person sees it in a picture of its close view: it is then their label.
+
+        Parameters
+        ----------
+        side : Side or str
+        code : str
+        number : int
+            Which picture, 0 or 1.
+        across, down : float
+            From its top left corner, 0 to 1 of its width.
+
+        Returns
+        -------
+        bool
+            Whether anything changed.
+
+        Raises
+        ------
+        GpError
+            Nothing is seen there, or the point is locked.
+        """
+        entry, volume = self._entry(Active(Side.parse(side), code)), self._scan.volume
+        where = entry.pictures[number].position_at(across, down) if entry.pictures else None
+        if where is None or volume is None or not volume.contains(where[None])[0]:
+            raise GpError(
+                f"there is nothing to place {entry.name} on",
+                landmark=code,
+                remedy="Click bone, or a place on a slice that lies in the scan.",
+            )
+        about = entry.landmark.provenance
+        source = about.source if about is not None else ""
+        if entry.suggestion is not None:
+            source = entry.suggestion.source
+        return self._labels.place(where, How.CORRECTED, source=source, side=side, code=code)
 
     def confirm(self) -> None:
         """Confirm what the page has shown and nobody wants to look at again; then turn the page.
@@ -217,7 +334,7 @@ class SuggestionPagesModel:
         if number >= self.n_pages:
             self.finish()
             return
-        self.number = number
+        self.number, self._scrolled = number, {}
         self._draw()
         self.changed.emit()
 
@@ -237,8 +354,8 @@ class SuggestionPagesModel:
         """Close the pages; what is still suggested then comes up in the views, the least certain first."""
         if not self.is_open:
             return
-        self._pages, self._drawn = (), {}
-        self._jobs.cancel(_KEY)
+        self._pages, self._drawn, self._scrolled = (), {}, {}
+        self._jobs.cancel(_KEY, _SCROLL_KEY)
         left = self._suggested()
         if left and self._scan.volume is not None:
             self._labels.look_closely(left[0].side, left[0].code or "")
@@ -259,15 +376,34 @@ class SuggestionPagesModel:
 
     def _entry(self, point: Active) -> PageEntry:
         code = point.code or ""
-        suggestion = self._document.landmarks(point.side).suggested.get(code)
-        drawn = None if suggestion is None else self._drawn.get(_to_draw(point, suggestion))
-        return PageEntry(point.side, code, suggestion, point in self._marked, drawn)
+        landmark = self._document.state.landmark(point.side, code)
+        drawn = tuple(self._drawn[point, n] for n in (0, 1) if (point, n) in self._drawn)
+        pictures = drawn if len(drawn) == 2 and landmark.shown_position is not None else ()
+        return PageEntry(point.side, code, landmark, point in self._marked, pictures)
+
+    def _step(self, point: Active, number: int) -> FloatArray | None:
+        """Return the way from one slice of a picture to the next, (3,) mm, scan frame; None for bone."""
+        look, volume = self._look(point, number), self._scan.volume
+        if volume is None or look not in PLANES:
+            return None
+        normal = self._view.frame.plane(look).normal
+        step: FloatArray = volume.step_along(normal) * normal
+        return step
+
+    def _n_scrolled(self, point: Active, number: int) -> float:
+        return self._scrolled.get((point, number), 0.0)
+
+    def _look(self, point: Active, number: int) -> str:
+        has_bone = self._scan.threshold is not None
+        return looks_of(point.side, point.code or "", with_bone=has_bone)[number]
 
     def _draw(self) -> None:
         """Draw what this page lacks, in the background; where it lacks nothing, the next one."""
-        volume = self._scan.volume
         lacking = (self._lacking(page) for page in self._pages[self.number : self.number + 2])
-        wanted = next(filter(None, lacking), ())
+        self._submit(next(filter(None, lacking), ()), _KEY)
+
+    def _submit(self, wanted: tuple[PictureToDraw, ...], key: str) -> None:
+        volume = self._scan.volume
         if volume is None or not wanted:
             return
         self._frame = self._view.frame
@@ -276,20 +412,34 @@ class SuggestionPagesModel:
         if level is not None and width is not None:
             window = level - width / 2, level + width / 2
         job = DrawCloseViews(volume, wanted, self._frame.axes, window, self._scan.threshold)
-        self._jobs.submit(job, self._take, key=_KEY)
+        self._jobs.submit(job, self._take, key=key)
 
-    def _lacking(self, page: Iterable[Active]) -> tuple[PointToDraw, ...]:
-        """Return the suggestions of a page whose close views are not drawn."""
-        suggested = [(p, self._document.landmarks(p.side).suggested.get(p.code or "")) for p in page]
-        points = [_to_draw(point, suggestion) for point, suggestion in suggested if suggestion is not None]
-        return tuple(point for point in points if point not in self._drawn)
+    def _lacking(self, points: Iterable[Active]) -> tuple[PictureToDraw, ...]:
+        """Return the pictures of some points that are not drawn as they stand."""
+        wanted = (self._to_draw(point, n) for point in points for n in (0, 1))
+        return tuple(each for each in wanted if each is not None and not self._is_drawn(each))
 
-    def _take(self, drawn: dict[PointToDraw, CloseView]) -> None:
-        self._drawn |= drawn
+    def _to_draw(self, point: Active, number: int) -> PictureToDraw | None:
+        """Return what a picture is to show; None of a point that has no place."""
+        place = self._entry(point).position
+        n_slices, step = self._n_scrolled(point, number), self._step(point, number)
+        if place is not None and n_slices and step is not None:
+            x, y, z = (np.array(place) + n_slices * step).tolist()
+            place = x, y, z
+        return None if place is None else PictureToDraw(point.side, point.code or "", number, place)
+
+    def _is_drawn(self, wanted: PictureToDraw) -> bool:
+        drawn = self._drawn.get((Active(wanted.side, wanted.code), wanted.number))
+        return drawn is not None and drawn.centre == wanted.centre
+
+    def _take(self, drawn: Mapping[PictureToDraw, ClosePicture]) -> None:
+        self._drawn |= {(Active(each.side, each.code), each.number): drawn[each] for each in drawn}
         self.changed.emit()
         self._draw()
 
-    def _on_landmarks(self, _: object) -> None:
+    def _on_landmarks(self, changed: frozenset[tuple[Side, str]]) -> None:
+        for key in [key for key in self._scrolled if (key[0].side, key[0].code) in changed]:
+            del self._scrolled[key]
         if self.is_open:
             self._draw()
             self.changed.emit()
@@ -297,23 +447,19 @@ class SuggestionPagesModel:
     def _on_frame(self) -> None:
         """Draw all again where the frame of the views is another one."""
         if self.is_open and self._view.frame is not self._frame:
-            self._drawn, self._shown = {}, {}
+            self._drawn, self._shown, self._scrolled = {}, {}, {}
             self._draw()
             self.changed.emit()
 
     def _on_reset(self) -> None:
-        self._marked, self._shown, self._drawn = set(), {}, {}
+        self._marked, self._shown, self._drawn, self._scrolled = set(), {}, {}, {}
         if self.is_open:
             self._pages = ()
-            self._jobs.cancel(_KEY)
+            self._jobs.cancel(_KEY, _SCROLL_KEY)
             self.finished.emit()
 
 
 _SHARED = tuple(row.code for row in FEATURES if row.shared)
-
-
-def _to_draw(point: Active, suggestion: Suggestion) -> PointToDraw:
-    return PointToDraw(point.side, point.code or "", suggestion.position)
 
 
 def _in_pages(points: Sequence[Active]) -> tuple[tuple[Active, ...], ...]:

@@ -143,8 +143,7 @@ class VolumeSlicer:
 
     def step_along(self, direction: ArrayLike) -> float:
         """Return how long a step of one voxel is in a (3,) unit direction, mm."""
-        in_voxels = self.volume.direction.T @ np.asarray(direction) / self.volume.spacing
-        return 1.0 / float(np.linalg.norm(in_voxels))
+        return self.volume.step_along(direction)
 
     def limits(self, plane: SlicePlane) -> tuple[float, float]:
         """Return the first and last position of slices, mm."""

@@ -25,7 +25,7 @@ _LONGEST_KEYS = "Middle drag, Shift+drag"
 """What the keys of all blocks are lined up to."""
 
 _COLUMNS = (
-    ("In the 3D view", "On a slice", "Estimate"),
+    ("In the 3D view", "On a slice", "On a page of close views", "Estimate"),
     ("View",),
     ("Landmarks", "Measure", "File", "Edit", "Help"),
 )

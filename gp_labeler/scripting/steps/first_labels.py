@@ -13,8 +13,10 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_labeler.models.suggestion_pages import PageEntry
 from gp_labeler.scripting.events import click, press_keys
+from gp_labeler.scripting.page_correction import correct_on_page
 from gp_labeler.scripting.step import Step
 from gp_labeler.scripting.window_driver import WindowDriver
+from gp_labeler.views.panels.label.close_view_tile import CloseViewTile
 from gp_labeler.views.panels.label.suggestion_page_dialog import SuggestionPageDialog
 
 __all__ = ["PATIENCE_SECONDS", "CheckLabelledScans", "CheckPages", "SuggestLike"]
@@ -67,39 +69,54 @@ class CheckPages(Step):
         Points such as ``CA L`` that shall be looked at in the views, so that they stay suggestions.
     within : float, optional
         Points that lie farther than this from their true place in the phantom, mm, are looked at, too.
+    correct : bool
+        Correct those on the page instead, also doubtful ones, where their close views show the true place.
     """
 
     do: ClassVar[str] = "check_pages"
     look_at: tuple[str, ...] = ()
     within: float | None = None
+    correct: bool = False
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
+        if self.correct and self.within is None:
+            raise GpError("check_pages: correct needs within", remedy="For example, within = 0.2.")
         pages, before = driver.workspace.pages, _n_suggested(driver)
         if not driver.window.commands.run("point.check_page"):
             raise GpError(driver.trouble(0) or "check_pages: nothing is suggested")
         (dialog,) = driver.window.findChildren(SuggestionPageDialog)
-        wanted, n_pages = {_point(each) for each in self.look_at}, pages.n_pages
+        n_pages, n_corrected = pages.n_pages, 0
         for _ in range(n_pages):
             driver.wait_until_idle()
             for tile in dialog.shown_tiles:
                 dialog.area.ensureWidgetVisible(tile)
                 driver.app.processEvents()
-                if self._is_wanted(driver, tile.entry, wanted):
-                    click(tile, tile.width() / 2, tile.height() / 2)
+                n_corrected += self._judge(driver, tile)
             press_keys(dialog.tiles[0], "Return")
         driver.wait_until_idle()
         left = _n_suggested(driver)
-        return f"{before - left} confirmed on {n_pages} {'page' if n_pages == 1 else 'pages'}, {left} left"
+        told = f"{before - left - n_corrected} confirmed on {n_pages} {'page' if n_pages == 1 else 'pages'}"
+        return f"{told}, {n_corrected} corrected, {left} left" if self.correct else f"{told}, {left} left"
 
-    def _is_wanted(
-        self, driver: WindowDriver, entry: PageEntry | None, wanted: set[tuple[Side, str]]
-    ) -> bool:
-        """Whether a person wants to look at a suggestion that the page offers to confirm."""
-        if entry is None or entry.suggestion is None or not entry.is_offered:
+    def _judge(self, driver: WindowDriver, tile: CloseViewTile) -> bool:
+        """Correct or mark what is not to be confirmed as it is; return whether it was corrected."""
+        entry = tile.entry
+        if entry is None or entry.suggestion is None:
             return False
-        if self.within is None or (entry.side, entry.code) in wanted:
-            return (entry.side, entry.code) in wanted
-        off = np.linalg.norm(np.array(entry.suggestion.position) - driver.truth(entry.side, entry.code))
+        wanted, is_far = (entry.side, entry.code) in map(_point, self.look_at), self._is_far(driver, entry)
+        if self.correct and is_far and not wanted:
+            aim = driver.truth(entry.side, entry.code)
+            if correct_on_page(driver, tile, aim, driver.voxel / 2):
+                return True
+        if (wanted or is_far) and entry.is_offered:
+            click(tile, tile.width() / 2, tile.height() / 2)
+        return False
+
+    def _is_far(self, driver: WindowDriver, entry: PageEntry) -> bool:
+        """Whether a suggestion lies farther from its true place than is allowed."""
+        if self.within is None or entry.position is None:
+            return False
+        off = np.linalg.norm(np.array(entry.position) - driver.truth(entry.side, entry.code))
         return bool(off > self.within)
 
 

@@ -11,6 +11,7 @@ from window_cases import MIDDLE, ball_volume
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.suggestion import Suggestion
+from gp_labeler.document.edit_tables import edit_of, edit_table, script_table
 from gp_labeler.document.edits import SuggestPoints
 from gp_labeler.document.state import How
 from gp_labeler.jobs.runner import QueueDispatcher
@@ -92,7 +93,7 @@ def test_a_close_view_that_is_not_drawn_yet_counts_for_nothing(shared, pages) ->
     pages.begin()  # nobody has drawn the first page again
     shared[0].jobs.cancel("close views")
     for entry in pages.entries:
-        pages.take_shown(replace(entry, close_view=None))
+        pages.take_shown(replace(entry, pictures=()))
     pages.confirm()
     assert n_placed(shared) == 0
 
@@ -148,10 +149,91 @@ def test_undo_brings_the_page_back_as_a_whole(shared, pages) -> None:
 def test_a_close_view_shows_the_grey_values_around_its_place(pages) -> None:
     """The ball is hollow where the points are, and bone where the pictures end, 4 mm beside them."""
     for entry in pages.entries:
-        grey = entry.close_view.pictures[0][..., 0]
+        grey = entry.pictures[0].rgb[..., 0]
         middle = grey.shape[0] // 2
         assert grey[middle, middle] < 50
         assert min(grey[middle, 0], grey[middle, -1], grey[0, middle], grey[-1, middle]) > 200
+
+
+def again(pages, entry):
+    """Return an entry as it stands now."""
+    (now,) = [each for each in pages.entries if (each.side, each.code) == (entry.side, entry.code)]
+    return now
+
+
+@pytest.mark.parametrize("doubtful", [False, True])
+def test_a_corrected_suggestion_is_a_label_of_its_own_and_undo_brings_the_suggestion_back(
+    shared, pages, doubtful
+) -> None:
+    workspace, calls = shared
+    entry = next(each for each in pages.entries if bool(each.refusal) is doubtful and each.code != "IN")
+    picture = entry.pictures[0]
+    aim = picture.position_at(0.6, 0.35)
+    pages.correct(entry.side, entry.code, 0, 0.6, 0.35)
+    mark = workspace.document.state.landmark(entry.side, entry.code)
+    assert mark.position == tuple(aim)
+    assert (mark.provenance.how, mark.provenance.source) == (How.CORRECTED, "5 labelled scans")
+    assert again(pages, entry).place_in(0) == pytest.approx((0.6, 0.35))  # until it is drawn again
+    calls.deliver_until_idle(workspace.jobs)
+    assert [each.centre for each in again(pages, entry).pictures] == [mark.position] * 2
+    pages.undo()
+    calls.deliver_until_idle(workspace.jobs)
+    now = again(pages, entry)
+    assert (now.suggestion, now.shows_its_place) == (entry.suggestion, True)
+
+
+def test_the_journal_and_a_recorded_script_say_all_of_a_correction(shared, pages) -> None:
+    document, edits = shared[0].document, []
+    entry, before = pages.entries[0], document.state
+    document.edited.connect(lambda edit, _: edits.append(edit))
+    pages.correct(entry.side, entry.code, 1, 0.4, 0.4)
+    (edit,) = edits
+    assert edit_of(edit_table(edit)) == edit
+    assert edit_of(script_table(edit)).apply(before).landmark(entry.side, entry.code).position == (
+        document.state.landmark(entry.side, entry.code).position
+    )
+
+
+@pytest.mark.parametrize("side", [L, R])
+def test_a_notch_turns_a_picture_by_one_voxel_along_the_normal_of_the_view(shared, pages, side) -> None:
+    workspace, calls = shared
+    entry = next(each for each in pages.entries if each.side is side)
+    for notches in (2, -3):
+        pages.scroll(side, entry.code, 0, notches)
+        calls.deliver_until_idle(workspace.jobs)
+    picture, place = again(pages, entry).pictures[0], np.array(entry.position)
+    normal = workspace.view.frame.plane(picture.name).normal
+    assert picture.centre - place == pytest.approx(-workspace.scan.volume.spacing[0] * normal)
+    assert again(pages, entry).pictures[1].centre == entry.position
+    seen = picture.position_at(0.7, 0.2)
+    assert pages.slices_to(side, entry.code, 0, seen) == pytest.approx(0, abs=1e-9)
+    assert pages.slices_to(side, entry.code, 0, place) == pytest.approx(1)
+    pages.correct(side, entry.code, 0, 0.7, 0.2)
+    assert workspace.document.state.landmark(side, entry.code).position == tuple(seen)
+
+
+def test_bone_has_no_slices(shared, pages) -> None:
+    entry = next(e for e in pages.entries if e.pictures[1].depths is not None)
+    assert not pages.scroll(entry.side, entry.code, 1, 1)
+    assert again(pages, entry).pictures[1].centre == entry.position
+
+
+def test_a_picture_that_is_turned_away_from_its_suggestion_confirms_nothing(shared, pages) -> None:
+    workspace, calls = shared
+    for entry in pages.entries:
+        pages.scroll(entry.side, entry.code, 0, 1)
+        calls.deliver_until_idle(workspace.jobs)
+    look_at_all(pages)
+    pages.confirm()
+    assert (pages.number, n_placed(shared)) == (0, 0)
+
+
+def test_a_click_beside_the_picture_places_nothing(shared, pages) -> None:
+    entry = pages.entries[0]
+    for where in ((1.2, 0.5), (0.5, -0.1)):
+        with pytest.raises(GpError, match=f"nothing to place {entry.name} on"):
+            pages.correct(entry.side, entry.code, 0, *where)
+    assert n_placed(shared) == 0
 
 
 def test_another_specimen_ends_the_pages_and_nothing_is_there_to_begin(shared) -> None:

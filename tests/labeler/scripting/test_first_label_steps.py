@@ -59,3 +59,20 @@ def test_pages_confirm_all_but_what_somebody_wants_to_look_at(tmp_path):
     placed_codes = {each["feature"] for each in report.features}
     assert {"RWP", "FPA"} <= placed_codes
     assert "CB" not in placed_codes
+
+
+def test_a_script_corrects_on_the_page_what_lies_off_the_truth(tmp_path):
+    placed = [
+        {"do": "place", "feature": code, "side": "L", "at": "truth"} for code in ("CA", "RWA", "OI", "IN")
+    ]
+    ghosts = [{"do": "place", "feature": code, "side": "L", "at": "ghost"} for code in ("CB", "RWP", "FPA")]
+    check = {"do": "check_pages", "within": 0.01, "correct": True}
+    near = [
+        {"do": "expect", "feature": code, "side": "L", "near": "truth", "within": 0.3}
+        for code in ("CB", "RWP", "FPA")
+    ]
+    report = run(tmp_path, {"do": "open", "phantom": 0}, *placed, *ghosts, check, *near)
+    assert report.ok, report.error
+    assert report.suggested == []
+    (told,) = [step.text for step in report.steps if "corrected" in step.text]
+    assert told == "0 confirmed on 1 page, 3 corrected, 0 left"

@@ -14,6 +14,7 @@ from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.document.edits import SuggestPoints
 from gp_labeler.document.state import How
+from gp_labeler.scripting.events import click, turn_wheel
 from gp_labeler.views.panels.label.suggest_row import SuggestRow
 from gp_labeler.views.panels.label.suggestion_page_dialog import SuggestionPageDialog
 
@@ -68,6 +69,76 @@ def test_clicked_ones_stay_and_enter_confirms_the_others(qtbot, window, dialog) 
     QTest.keyClick(dialog.confirm, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert landmarks(window).placed == ()
     assert window.workspace.pages.number == 0
+
+
+@pytest.mark.parametrize(("doubtful", "number"), [(False, 0), (False, 1), (True, 0)])
+def test_a_click_with_ctrl_places_the_feature_where_it_is_seen(
+    qtbot, window, dialog, doubtful, number
+) -> None:
+    """To half a pixel of the picture; it is drawn again around the label, which Ctrl+Z takes back."""
+    tile = next(
+        each
+        for each in dialog.shown_tiles
+        if bool(each.entry.refusal) is doubtful and each.entry.pictures[number].depths is None
+    )
+    code, before, picture = tile.entry.code, tile.entry.suggestion, tile.entry.pictures[number]
+    x, y = (round(each) for each in tile.pixel_of_place(number, 0.62, 0.41))
+    click(tile, x, y, ctrl=True)
+    mark = window.workspace.document.state.landmark(L, code)
+    assert (mark.provenance.how, mark.provenance.source) == (How.CORRECTED, "5 labelled scans")
+    seen_at = np.array(tile.pixel_of_place(number, *picture.place_of(mark.position)))
+    assert np.abs(seen_at - (x + 0.5, y + 0.5)).max() < 0.5
+    assert picture.depth_of(mark.position) == pytest.approx(0, abs=1e-9)
+    assert "placed by you" in tile.accessibleName()
+    wait_until_idle(qtbot, window)
+    assert tile.entry.shows_its_place
+    QTest.keyClick(tile, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert tile.entry.suggestion == before
+    assert landmarks(window).placed == ()
+
+
+def test_what_was_corrected_stays_when_enter_confirms_the_others(qtbot, window, dialog) -> None:
+    tile = next(each for each in dialog.shown_tiles if each.entry.is_offered)
+    code = tile.entry.code
+    click(tile, *tile.pixel_of_place(0, 0.3, 0.3), ctrl=True)
+    wait_until_idle(qtbot, window)
+    assert dialog.confirm.text() == f"Confirm {len(dialog.shown_tiles) - 2} and go on"  # ZL is doubtful
+    QTest.keyClick(tile, Qt.Key.Key_Return)
+    state = window.workspace.document.state
+    hows = {state.landmark(L, each).provenance.how for each in landmarks(window).placed if each != code}
+    assert hows == {How.PAGE}
+    assert state.landmark(L, code).provenance.how is How.CORRECTED
+
+
+def test_the_wheel_turns_one_picture_to_the_next_slice_and_a_click_there_places_it(
+    qtbot, window, dialog
+) -> None:
+    tile = next(each for each in dialog.shown_tiles if each.entry.is_offered)
+    entry, code = tile.entry, tile.entry.code
+    pixel = tile.pixel_of_place(0, 0.5, 0.5)
+    turn_wheel(tile, *pixel, 1)
+    wait_until_idle(qtbot, window)
+    assert not tile.entry.shows_its_place
+    spacing = window.workspace.scan.volume.spacing[0]
+    assert tile.entry.mm_off_slice(0) == pytest.approx(spacing)
+    assert tile.entry.mm_off_slice(1) == 0
+    click(tile, *pixel, ctrl=True)
+    placed = np.array(window.workspace.document.state.landmark(L, code).position)
+    assert abs(entry.pictures[0].depth_of(placed)) == pytest.approx(spacing)
+
+
+def test_the_wheel_over_bone_and_beside_the_pictures_scrolls_the_page(qtbot, window, dialog) -> None:
+    tile = next(each for each in dialog.shown_tiles if each.entry.pictures[1].depths is not None)
+    for pixel in (tile.pixel_of_place(1, 0.5, 0.5), (tile.width() / 2, 4)):
+        turn_wheel(tile, *pixel, 1)
+        assert tile.entry.shows_its_place
+
+
+def test_ctrl_beside_the_pictures_marks_as_ever(qtbot, window, dialog) -> None:
+    tile = next(each for each in dialog.shown_tiles if each.entry.is_offered)
+    click(tile, tile.width() / 2, 8, ctrl=True)
+    assert tile.entry.is_marked
+    assert landmarks(window).placed == ()
 
 
 def test_enter_before_the_page_is_drawn_confirms_nothing(qtbot, window, dialog) -> None:

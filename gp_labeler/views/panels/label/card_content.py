@@ -199,6 +199,7 @@ def _status_words(labels: LabelsModel, side: Side, code: str) -> str:
         "slice": "Placed on a slice.",
         "confirmed suggestion": "Suggested and confirmed.",
         "confirmed from a page": "Suggested, and confirmed from a page of close views.",
+        "corrected on a page": "Suggested, then placed by hand on a page of close views.",
         "nudged suggestion": "Suggested, then corrected by you.",
     }
     return words.get(how, f"{how.capitalize()}." if how else "Placed.") + by

@@ -78,6 +78,8 @@ class SuggestionPageDialog(QDialog):
         tile = CloseViewTile()
         tile.clicked.connect(partial(self._mark, tile))
         tile.shown.connect(self._pages.take_shown)
+        tile.pointed_at.connect(partial(self._correct, tile))
+        tile.scrolled.connect(partial(self._scroll, tile))
         return tile
 
     def _button(self, words: str, run: object, hint: str) -> QPushButton:
@@ -139,6 +141,18 @@ class SuggestionPageDialog(QDialog):
             self._pages.mark(tile.entry.side, tile.entry.code, tile.isChecked())
             tile.show_entry(tile.entry)  # what is decided stays unmarked
 
+    def _correct(self, tile: CloseViewTile, number: int, across: float, down: float) -> None:
+        entry = tile.entry
+        if entry is not None:
+            attempt(
+                self._workspace,
+                lambda: self._pages.correct(entry.side, entry.code, number, across, down),
+            )
+
+    def _scroll(self, tile: CloseViewTile, number: int, n_slices: float) -> None:
+        if tile.entry is not None:
+            self._pages.scroll(tile.entry.side, tile.entry.code, number, n_slices)
+
     def _confirm(self, *_: object) -> None:
         attempt(self._workspace, self._pages.confirm)
 
@@ -150,6 +164,7 @@ class SuggestionPageDialog(QDialog):
 
 
 _EXPLAINED = (
-    "Check the cross in both pictures. Click a close view that you want to look at again. Enter confirms the "
-    "others, except the doubtful ones (orange). Those and the marked ones come up in the views afterwards."
+    "Check the cross in both pictures; the wheel shows the next slices. If it is wrong, hold Ctrl and click "
+    "where the feature is, or click without Ctrl to look at it in the views afterwards. Enter confirms the "
+    "others, except the doubtful ones (orange), which come up in the views, too."
 )
