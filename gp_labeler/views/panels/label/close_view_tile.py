@@ -106,7 +106,7 @@ class _ClosePictures(QWidget):
         painter.setOpacity(_FAINT if off else 1.0)
         self._mark(painter, entry, number)
         painter.setOpacity(1.0)
-        self._name(painter, box, f"{picture.name}, {mm_text(off)} away" if off else picture.name)
+        self._name(painter, box, f"{picture.name}\n{mm_text(off)} away" if off else picture.name)
         painter.restore()
 
     def _mark(self, painter: QPainter, entry: PageEntry, number: int) -> None:
@@ -128,8 +128,8 @@ class _ClosePictures(QWidget):
     def _name(self, painter: QPainter, box: QRectF, name: str) -> None:
         """Write which plane it is, at the foot, on a ground of its own: pictures are dark and light."""
         painter.setFont(font_of(self, CAPTION))
-        metrics = QFontMetricsF(painter.font())
-        width, height = metrics.horizontalAdvance(name) + 6, metrics.height() + 2
+        size = QFontMetricsF(painter.font()).size(0, name)
+        width, height = size.width() + 6, size.height() + 2
         ground = QRectF(box.left() + 2, box.bottom() - height - 2, width, height)
         painter.fillRect(ground, QColor("#000000"))
         painter.setPen(QColor("#FFFFFF"))
