@@ -217,12 +217,15 @@ def judged(case: Case, template: HeadTemplate) -> dict[str, Any]:
     true_plane, true_axes = min(case.truths, key=lambda truth: plane.angle_to_deg(truth[0]))
     middle = case.volume.extent.mean(axis=0)[None]
     sign = np.sign(plane.normal @ true_plane.normal)
-    back = axes[:, 1]
+    left, back = plane.normal @ true_axes, axes[:, 1]
+    left *= np.sign(left[0])
     confidence = pose.confidence
     return row | {
         "deg": plane.angle_to_deg(true_plane),
         "mm": float(abs(plane.heights(middle)[0] - sign * true_plane.heights(middle)[0])),
         "pitch": float(np.degrees(np.arctan2(back @ true_axes[:, 2], back @ true_axes[:, 1]))),
+        "roll": float(np.degrees(np.arctan2(left[2], left[0]))),
+        "yaw": float(np.degrees(np.arctan2(left[1], left[0]))),
         "front": bool(back @ true_axes[:, 1] > 0.5 and axes[:, 2] @ true_axes[:, 2] > 0.5),
         "warned": bool(pose.warnings),
         "confidence": None if confidence is None else vars(confidence),
@@ -282,7 +285,8 @@ def show(row: dict[str, Any]) -> None:
         text = (
             f"{row['deg']:6.2f} deg {row['mm']:6.3f} mm, pitch {row['pitch']:6.1f}, "
             f"front and up {'right' if row['front'] else 'WRONG'}{' (warned)' if row['warned'] else ''}, "
-            f"agreement {c['agreement']:.2f} overlap {c['overlap']:.2f} margin {c['margin']:.2f}"
+            f"agreement {c['agreement']:.2f} overlap {c['overlap']:.2f} margin {c['margin']:.2f} "
+            f"uncertainty {c['uncertainty_deg']:.1f}"
         )
     print(f"{row['group']:26s} {row['name']:34s} {text}, {row['cpu']:.1f} s", flush=True)
 
@@ -290,7 +294,8 @@ def show(row: dict[str, Any]) -> None:
 def summary(rows: list[dict[str, Any]]) -> None:
     """Print the figures of each group."""
     print(
-        "\ngroup: n, refused, over 3 degrees | degrees, mm: median / 90 % / max | front | pitch max | CPU s"
+        "\ngroup: n, refused, over 3 degrees | degrees, mm: median / 90 % / max | front | "
+        "pitch, roll, yaw: median / max | CPU s"
     )
     for group in dict.fromkeys(row["group"] for row in rows):
         own = [row for row in rows if row["group"] == group]
@@ -302,13 +307,19 @@ def summary(rows: list[dict[str, Any]]) -> None:
                 values = np.array([row[key] for row in found])
                 line += f" | {np.median(values):.2f} / {np.quantile(values, 0.9):.2f} / {values.max():.2f}"
             line += f" | {sum(row['front'] for row in found)} of {len(found)}"
-            line += f" | {max(abs(row['pitch']) for row in found):.0f}"
+            line += " | " + ", ".join(angles(found, key) for key in ("pitch", "roll", "yaw"))
         print(
             line
             + f" | {np.median([row['cpu'] for row in own]):.1f}, max {max(row['cpu'] for row in own):.1f}"
         )
     wrong = [row for row in rows if row.get("deg", 0.0) > 3.0]
     print(f"accepted though more than 3 degrees off: {len(wrong)} of {len(rows)}")
+
+
+def angles(rows: list[dict[str, Any]], key: str) -> str:
+    """Return the median and the greatest error of an angle, degrees, of heads whose front is right."""
+    values = [abs(row[key]) for row in rows if row["front"]]
+    return f"{np.median(values):.2f} / {max(values):.2f}" if values else "-"
 
 
 def seeds(text: str) -> list[int]:

@@ -16,7 +16,7 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.procrustes import fit_rigid
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.bone import Bone, bone_of
-from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values
+from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values, uncertainty_deg
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import agreement_of
 from gp_labeler.head_pose.result import LEFT_OF_LANDMARKS, Confidence, HeadPose, HeadPoseError
@@ -91,6 +91,7 @@ def straighten_by_landmarks(
     plane, confidence, bone, warnings = _refined(volume, start, threshold) if refine else unrefined
     axes, origin = axes_in_plane(fit.rotation, plane), plane.nearest(fit.translation)
     if bone is not None and confidence is not None:
+        warnings += confidence.warnings
         lying = front_and_up(bone, plane, template or phantom_template(), _SILENT)
         if float(lying.axes[:, 2] @ axes[:, 2]) < 0:
             warnings.append("the bone looks upside down: check whether left and right are exchanged")
@@ -188,10 +189,11 @@ def _refined(volume: Volume, start: MidPlane, threshold: float | None) -> _Refin
         fine, bone = bone_of(volume, threshold)
     except GpError as error:
         return start, None, None, [f"not refined by the bone: {error}"]
-    plane = refined_by_grey_values(GreyValues(fine), start)
+    values = GreyValues(fine)
+    plane = refined_by_grey_values(values, start)
     agreement = agreement_of(bone, plane)
     before = agreement_of(bone, start)
-    confidence = Confidence(agreement.share, agreement.overlap, agreement.share - before.share)
     if plane.angle_to_deg(start) > _FARTHEST_DEG or agreement.share < max(_LEAST_AGREEMENT, before.share):
         return start, None, bone, ["not refined: the bone's symmetry does not agree with the points"]
-    return plane, confidence, bone, []
+    margin, uncertain = agreement.share - before.share, uncertainty_deg(values, plane)
+    return plane, Confidence(agreement.share, agreement.overlap, margin, uncertain), bone, []

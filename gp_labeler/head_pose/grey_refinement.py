@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
+from numpy.typing import NDArray
 
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.bone import Bone
 from gp_labeler.head_pose.mid_plane import MidPlane
 
-__all__ = ["refined_by_grey_values"]
+__all__ = ["GreyValues", "refined_by_grey_values", "uncertainty_deg"]
 
 _N_POINTS = 12_000
 _BLUR_VOXELS = 1.0
@@ -45,6 +48,22 @@ class GreyValues:
         self.own = self.grey_values[tuple(chosen.T)].astype(np.float64)
         T = bone.scan.T_scan_index
         self.points: FloatArray = chosen[:, ::-1] @ T[:3, :3].T + T[:3, 3]
+
+    def halves(self, plane: MidPlane) -> list[GreyValues]:
+        """Return the front and the back half of the points, the upper and the lower, the outer and the inner.
+
+        Each has points on both sides of the plane, and half of them.
+        """
+        across = np.linalg.svd(plane.normal[None])[2][1:]
+        in_plane = (self.points - self.points.mean(axis=0)) @ across.T
+        along = in_plane @ np.linalg.svd(in_plane, full_matrices=False)[2].T
+        measures = (*along.T, np.abs(plane.heights(self.points)))
+        return [self._only(half) for m in measures for half in (m > np.median(m), m <= np.median(m))]
+
+    def _only(self, chosen: NDArray[np.bool_]) -> GreyValues:
+        part = copy(self)
+        part.points, part.own = self.points[chosen], self.own[chosen]
+        return part
 
     def differences(self, plane: MidPlane, *, every: int = 1) -> FloatArray:
         """Return how much brighter the mirror image of every n-th point is; 0 beyond the scan."""
@@ -99,3 +118,22 @@ def refined_by_grey_values(values: GreyValues, plane: MidPlane, *, quick: bool =
             max_nfev=_MOST_STEPS,
         ).x
     return moved(found)
+
+
+def uncertainty_deg(values: GreyValues, plane: MidPlane) -> float:
+    """Return the standard deviation of a plane's direction, degrees, as the halves of the head tell it.
+
+    The plane is fitted again to each half of the points. Where bone alone is symmetric, they agree within a
+    degree; where a holder, or what is too coarse to be told from it, pulls at the plane, they do not. The
+    deviations from the whole, squared, are on average the variance (McCarthy, "Pseudo-replication: half
+    samples", 1969).
+
+    Parameters
+    ----------
+    values : GreyValues
+    plane : MidPlane
+        The one fitted to all points, by `refined_by_grey_values`.
+    """
+    halves = values.halves(plane)
+    away = [refined_by_grey_values(half, plane, quick=True).angle_to_deg(plane) for half in halves]
+    return float(np.sqrt(np.mean(np.square(away))))

@@ -13,10 +13,22 @@ from gp_core.frames import RigidTransform
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.mid_plane import MidPlane
 
-__all__ = ["LEFT_OF_LANDMARKS", "Confidence", "HeadPose", "HeadPoseError", "SeveralHeadsError"]
+__all__ = [
+    "DOUBTFUL_DEG",
+    "LEFT_OF_LANDMARKS",
+    "MOST_DEG",
+    "Confidence",
+    "HeadPose",
+    "HeadPoseError",
+    "SeveralHeadsError",
+]
 
 LEFT_OF_LANDMARKS = "the sides of the landmarks"
 """What left is taken from where a head was straightened by its landmarks."""
+
+DOUBTFUL_DEG, MOST_DEG = 1.5, 3.0
+"""Uncertainty of a mid-plane with which it is accepted with a warning, as it may be 3 degrees off (two
+standard deviations), and beyond which it is refused."""
 
 _REMEDY = (
     "Place IN and a pair such as OI, and straighten by landmarks; or give three points: midline, left, right."
@@ -61,11 +73,24 @@ class Confidence:
         Share of the surface whose mirror image lies in the scan, 0 to 1.
     margin : float
         Lead in agreement over the best other plane.
+    uncertainty_deg : float
+        Standard deviation of its direction, degrees, from halves of the head; 0 before it is known.
     """
 
     agreement: float
     overlap: float
     margin: float
+    uncertainty_deg: float = 0.0
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A warning, where the plane may well be off by more than a user should accept unseen."""
+        if self.uncertainty_deg <= DOUBTFUL_DEG:
+            return ()
+        return (
+            f"the mid-plane is uncertain by {self.uncertainty_deg:.0f} degrees: "
+            "compare left and right in the coronal and axial slices",
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +148,7 @@ class HeadPose:
                 "agreement": confidence.agreement,
                 "overlap": confidence.overlap,
                 "margin": confidence.margin,
+                "uncertaintyDegrees": confidence.uncertainty_deg,
             },
             "pitch": self.pitch,
             "left": self.left,

@@ -21,10 +21,10 @@ from gp_labeler.head_pose.bone import (
     threshold_above,
     threshold_candidates,
 )
-from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values
+from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values, uncertainty_deg
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import Agreement, agreement_of, search_planes
-from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError, SeveralHeadsError
+from gp_labeler.head_pose.result import MOST_DEG, Confidence, HeadPose, HeadPoseError, SeveralHeadsError
 from gp_labeler.head_pose.template import HeadTemplate, InPlane, front_and_up, phantom_template
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.volume import Volume
@@ -82,7 +82,9 @@ class _Found:
 
     def _passes(self, slack: float) -> bool:
         c = self.confidence
-        return not self._lacks_an_image(slack) and any(
+        if c.uncertainty_deg > MOST_DEG or self._lacks_an_image(slack):
+            return False
+        return any(
             c.agreement + slack >= agreement and c.overlap + slack >= overlap and c.margin + slack >= margin
             for agreement, overlap, margin in (_WHOLE, _PART, _CLEAR)
         )
@@ -168,7 +170,7 @@ def _mid_plane(
     volume: Volume,
     report: Report,
 ) -> _Found:
-    """Return the first plane that can be trusted, over thresholds and islands of bone."""
+    """Return the first plane without a warning, else the least uncertain, over thresholds and islands."""
     tried: list[_Found] = []
     for islands in _islands_at(_levels(coarse) if threshold is None else (threshold,), fine, coarse):
         heads, apart = _separate_heads(islands, report)
@@ -180,8 +182,11 @@ def _mid_plane(
         for bone in islands.searched:
             found = _best_plane(bone, islands, report)
             tried.append(found)
-            if found.accepted:
+            if found.accepted and not found.confidence.warnings:
                 return found
+    accepted = [found for found in tried if found.accepted]
+    if accepted:
+        return min(accepted, key=lambda found: found.confidence.uncertainty_deg)
     raise HeadPoseError(_why(max(tried, key=lambda f: f.confidence.agreement)), file=volume.path)
 
 
@@ -284,7 +289,9 @@ def _best_plane(bone: Bone, islands: _Islands, report: Report) -> _Found:
     report(0.9)
     others = [pair for pair in judged if pair[1] is not found.plane]
     plane = refined_by_grey_values(values, found.plane)
-    return _leading(bone, [(agreement_of(bone, plane), plane), *others])
+    found = _leading(bone, [(agreement_of(bone, plane), plane), *others])
+    uncertain = uncertainty_deg(values, found.plane)
+    return replace(found, confidence=replace(found.confidence, uncertainty_deg=uncertain))
 
 
 def _leading(bone: Bone, judged: list[tuple[Agreement, MidPlane]]) -> _Found:
@@ -307,6 +314,8 @@ def _why(found: _Found) -> str:
         reason = f"only {100 * c.overlap:.0f} % of the bone has a mirror image within the scan"
     elif c.agreement < _WHOLE[0]:
         reason = f"only {100 * c.agreement:.0f} % of the bone meets its mirror image"
+    elif c.uncertainty_deg > MOST_DEG:
+        reason = f"its parts do not agree on one plane: it is uncertain by {c.uncertainty_deg:.0f} degrees"
     else:
         reason = "it is nearly as symmetric in another plane"
     return f"{_FAILED}: {reason}"
@@ -334,7 +343,7 @@ def _posed(
     template: HeadTemplate,
     found_by: str = "symmetry",
 ) -> HeadPose:
-    warnings = []
+    warnings = [] if confidence is None else list(confidence.warnings)
     if lying.margin < _THIN_MARGIN or not _dense_in_front(bone, lying):
         warnings.append("front and up are uncertain: check that the nose points forward and the teeth down")
     return HeadPose(

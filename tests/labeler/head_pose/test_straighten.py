@@ -15,6 +15,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.cli.entry import main
 from gp_labeler.head_pose import (
+    Confidence,
     HeadPoseError,
     HeadTemplate,
     MidPlane,
@@ -25,6 +26,8 @@ from gp_labeler.head_pose import (
 )
 from gp_labeler.head_pose.bone import Bone, bone_of, coarse_scan, indices_of, threshold_above
 from gp_labeler.head_pose.distance_field import DistanceField
+from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values, uncertainty_deg
+from gp_labeler.head_pose.result import DOUBTFUL_DEG
 from gp_labeler.head_pose.template import front_and_up
 from gp_labeler.imaging.progress import Cancelled, Report
 from gp_labeler.imaging.readers import read_volume
@@ -138,6 +141,61 @@ def test_a_cropped_head_in_a_scanners_circle_is_straightened():
     deg, mm, _ = errors(straighten(phantom.volume), phantom)
     assert deg < 1.5
     assert mm < 0.3
+
+
+def in_large_voxels(volume):
+    """Return a scan in voxels of twice the edge."""
+    nz, ny, nx = (n // 2 for n in volume.array.shape)
+    blocks = volume.array[: 2 * nz, : 2 * ny, : 2 * nx].reshape(nz, 2, ny, 2, nx, 2)
+    T = volume.T_scan_voxel.copy()
+    T[:3, 3] += T[:3, :3] @ (0.5, 0.5, 0.5)
+    T[:3, :3] *= 2
+    return Volume(blocks.mean(axis=(1, 3, 5)).astype(np.float32), T)
+
+
+def test_a_head_in_a_cradle_in_coarse_voxels_is_never_accepted_in_silence_though_wrong():
+    turn = HeadVariation.drawn(418, ["turn"]).turn
+    phantom = head(418, USUAL, turn, holder="cradle")
+    try:
+        pose = straighten(in_large_voxels(phantom.volume))
+    except HeadPoseError:
+        return
+    assert errors(pose, phantom)[0] < 2.0 or any("is uncertain by" in text for text in pose.warnings)
+
+
+def bent(degrees):
+    """Return bone whose back is symmetric in the plane x = 0, and whose front in one turned by an angle."""
+    rng = np.random.default_rng(8)
+    lumps = rng.uniform((4, -36, -12), (18, 36, 12), (60, 3))
+    radii = rng.uniform(2.0, 4.5, 60)
+    angle = np.radians(degrees) * (lumps[:, 1] < 0)
+    places = np.array(np.meshgrid(*[np.arange(-n, n + 1.0) for n in (26, 44, 18)], indexing="ij"))
+    away = np.full(places.shape[1:], np.inf)
+    for side in (-1, 1):
+        x, y, z = (lumps * (side, 1, 1)).T
+        turned = np.stack([x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle), z])
+        for centre, radius in zip(turned.T, radii, strict=True):
+            gap = np.sqrt(((places - centre[:, None, None, None]) ** 2).sum(axis=0)) - radius
+            away = np.minimum(away, gap)
+    values = (1000 * np.clip(0.5 - away, 0, 1)).transpose(2, 1, 0).astype(np.float32)
+    T = np.eye(4)
+    T[:3, 3] = (-26, -44, -18)
+    scan = coarse_scan(Volume(np.ascontiguousarray(values), T), 1.0)
+    return GreyValues(Bone.islands(scan, 500.0)[0])
+
+
+@pytest.mark.parametrize(("degrees", "low", "high"), [(0.0, 0.0, 0.3), (6.0, 1.5, 6.0)])
+def test_a_plane_is_as_uncertain_as_the_halves_of_a_head_differ(degrees, low, high):
+    values = bent(degrees)
+    plane = refined_by_grey_values(values, MidPlane([1.0, 0.0, 0.0], 0.0))
+    assert low <= uncertainty_deg(values, plane) <= high
+
+
+@pytest.mark.parametrize(("uncertain", "n"), [(0.0, 0), (DOUBTFUL_DEG, 0), (2.2, 1)])
+def test_an_uncertain_plane_is_warned_of(uncertain, n):
+    warnings = Confidence(0.9, 1.0, 0.3, uncertain).warnings
+    assert len(warnings) == n
+    assert all("uncertain by 2 degrees" in text for text in warnings)
 
 
 @pytest.mark.parametrize("holder", ["tube", "rod"])
@@ -440,7 +498,7 @@ def test_the_command_says_the_pose_and_writes_it(tmp_path, capsys):
     known = np.array(json.loads(truth.read_text())["T_head_scan"])
     assert np.abs(np.array(pose["T_head_scan"])[0, :3] @ known[0, :3]) > np.cos(np.radians(0.4))
     assert pose["foundBy"] == "symmetry"
-    assert set(pose["confidence"]) == {"agreement", "overlap", "margin"}
+    assert set(pose["confidence"]) == {"agreement", "overlap", "margin", "uncertaintyDegrees"}
 
 
 def test_the_command_takes_landmarks(tmp_path, capsys):
