@@ -300,7 +300,6 @@ class SuggestionPagesModel:
         if where is None or volume is None or not volume.contains(where[None])[0]:
             raise GpError(
                 f"there is nothing to place {entry.name} on",
-                landmark=code,
                 remedy="Click bone, or a place on a slice that lies in the scan.",
             )
         about = entry.landmark.provenance

@@ -16,9 +16,10 @@ from window_cases import BALL_MM, MIDDLE, wait_until_idle
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.commands.actions import ACTIONS
 from gp_labeler.document import touching
-from gp_labeler.document.edits import SwapPoints
+from gp_labeler.document.edits import SuggestPoints, SwapPoints
 from gp_labeler.document.landmark_export import export_landmarks
 from gp_labeler.document.landmark_import import import_landmarks
 from gp_labeler.document.specimen_edits import RenameSpecimen, SetNotes
@@ -27,10 +28,12 @@ from gp_labeler.document.touches import TouchHow
 from gp_labeler.jobs.library_check import CheckLibrary, LibraryChecked
 from gp_labeler.models.workflow import Active
 from gp_labeler.scene.planes import Plane
+from gp_labeler.scripting import events
 from gp_labeler.scripting.runner import run_script
 from gp_labeler.scripting.script import make_script, read_script
 from gp_labeler.scripting.steps import STEPS
 from gp_labeler.scripting.steps.edits import EDIT_STEPS
+from gp_labeler.views.panels.label.suggestion_page_dialog import SuggestionPageDialog
 from gp_labeler.views.recorder import Recorder, script_text
 
 SAVED = "ball.gpspecimen.json"
@@ -329,6 +332,33 @@ def test_suggestions_and_confirmations_are_done_again(recording) -> None:
     ]
     assert recording.labels.progress(Side.LEFT).text == "6 placed, 14 suggested"  # CO is computed
     recording.check(*FILES[:2])
+
+
+def test_pages_of_suggestions_are_done_again(recording) -> None:
+    """One is corrected in another slice, and moved once more; the others are confirmed by Enter."""
+    recording.begin()
+    found = {code: Suggestion(tuple(INSIDE + n / 9), 0.3, "x") for n, code in enumerate(("CA", "MH", "FPA"))}
+    recording.document.do(SuggestPoints(Side.LEFT, found, recording.document.provenance(How.GHOST)))
+    recording.run("point.check_page")
+    (dialog,) = recording.window.findChildren(SuggestionPageDialog)
+    tile = dialog.shown_tiles[0]
+    for place in ((0.3, 0.6), (0.55, 0.45)):
+        events.turn_wheel(tile, *tile.pixel_of_place(0, *place), 2)
+        wait_until_idle(recording.qtbot, recording.window)
+        events.click(tile, *tile.pixel_of_place(0, *place), ctrl=True)
+        wait_until_idle(recording.qtbot, recording.window)
+    for each in dialog.shown_tiles:
+        dialog.area.ensureWidgetVisible(each)
+        wait_until_idle(recording.qtbot, recording.window)
+    recording.qtbot.waitUntil(lambda: _confirms(recording, dialog))
+    steps = [step for step in recording.check(*FILES[:2]) if step.endswith(("_point", "_page"))]
+    assert steps == ["place_point", "place_point", "confirm_page"]
+
+
+def _confirms(recording, dialog) -> bool:
+    """Whether Enter has confirmed all: a page that is not painted yet stays."""
+    QTest.keyClick(dialog.tiles[0], Qt.Key.Key_Return)
+    return not recording.workspace.pages.is_open
 
 
 def test_touches_and_verdicts_are_done_again(recording) -> None:

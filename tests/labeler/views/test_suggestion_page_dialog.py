@@ -134,6 +134,18 @@ def test_the_wheel_over_bone_and_beside_the_pictures_scrolls_the_page(qtbot, win
         assert tile.entry.shows_its_place
 
 
+def test_a_click_on_nothing_says_so_in_the_dialog_until_something_is_done(qtbot, window, dialog) -> None:
+    tile = next(each for each in dialog.shown_tiles if each.entry.pictures[1].depths is not None)
+    empty = np.argwhere(np.isnan(tile.entry.pictures[1].depths))[0]
+    down, across = (empty + 0.5) / len(tile.entry.pictures[1].depths)
+    explained = dialog.hint.text()
+    click(tile, *tile.pixel_of_place(1, across, down), ctrl=True)
+    assert landmarks(window).placed == ()
+    assert tile.entry.name in dialog.hint.text()
+    click(tile, *tile.pixel_of_place(0, 0.5, 0.4), ctrl=True)
+    assert dialog.hint.text() == explained
+
+
 def test_ctrl_beside_the_pictures_marks_as_ever(qtbot, window, dialog) -> None:
     tile = next(each for each in dialog.shown_tiles if each.entry.is_offered)
     click(tile, tile.width() / 2, 8, ctrl=True)

@@ -15,6 +15,7 @@ from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.label.close_view_tile import CloseViewTile
 from gp_labeler.views.panels.parts import open_at, scrolled, text_label
 from gp_labeler.views.signals import attempt, follow
+from gp_labeler.views.stylesheet import set_role
 
 __all__ = ["SuggestionPageDialog"]
 
@@ -38,7 +39,7 @@ class SuggestionPageDialog(QDialog):
         self._workspace, self._pages = workspace, workspace.pages
         self.setWindowTitle("Check suggestions in pages")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.text = text_label(role="heading")
+        self.text, self.hint = text_label(role="heading"), text_label(_EXPLAINED, "hint", wrap=True)
         self.tiles = [self._tile() for _ in range(PAGE_SIZE)]
         self.back = self._button("Back", partial(self._turn, -1), "Show the page before")
         self.leave = self._button(
@@ -55,6 +56,7 @@ class SuggestionPageDialog(QDialog):
     def refresh(self, *_: object) -> None:
         """Show the page as it stands."""
         entries = self._pages.entries
+        self._show_hint(_EXPLAINED, "hint")
         self.text.setText(self._pages.text)
         for tile, entry in zip(self.tiles, entries, strict=False):
             tile.show_entry(entry)
@@ -98,9 +100,9 @@ class SuggestionPageDialog(QDialog):
         fit(self, self._arrange)
         close = self._button("Close", self.reject, "What is left comes up in the views")
         buttons = in_row(self.back, self.leave, STRETCH, close, self.confirm, margins=0)
-        explained, self.area = text_label(_EXPLAINED, "hint", wrap=True), scrolled(page)
+        self.area = scrolled(page)
         in_column(
-            self.text, explained, wide(self.area), buttons, margins=(14, 10, 14, 12), spacing=8, of=self
+            self.text, self.hint, wide(self.area), buttons, margins=(14, 10, 14, 12), spacing=8, of=self
         )
         self._enter((page, self.confirm))
 
@@ -131,6 +133,17 @@ class SuggestionPageDialog(QDialog):
     def _listen(self) -> None:
         follow(self, self._pages.changed, self.refresh)
         follow(self, self._pages.finished, self._on_finished)
+        follow(self, self._workspace.messages.said, self._on_said)
+
+    def _on_said(self, text: str, level: str) -> None:
+        """Show here what went wrong: the window, which says it too, may be hidden."""
+        if level != "info" and self.isVisible():
+            self.hint.setMinimumHeight(self.hint.height())  # the page stays where it is
+            self._show_hint(text, "warning")
+
+    def _show_hint(self, text: str, role: str) -> None:
+        self.hint.setText(text)
+        set_role(self.hint, role)
 
     def _on_finished(self) -> None:
         if self.isVisible():
