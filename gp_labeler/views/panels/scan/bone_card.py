@@ -57,7 +57,7 @@ class BoneCard(Card):
         )
         self.add(
             text_label(
-                "Lower it until the holes in thin bone just close. The slices follow while you drag.",
+                "Lower the threshold until holes in thin bone just close. The slices follow while you drag.",
                 "hint",
                 wrap=True,
             )
