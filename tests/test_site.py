@@ -54,6 +54,28 @@ def test_every_command_has_a_page_with_its_options(source: Path) -> None:
     assert "gp-labeler mesh head.nrrd" in pages["gp-labeler-mesh"]
 
 
+def test_options_in_the_text_of_command_pages_are_code(source: Path) -> None:
+    """Otherwise Sphinx makes one dash of their two hyphens."""
+    for page in (source / "reference" / "commands").iterdir():
+        prose = re.sub(r"```.*?```|`[^`]*`", "", page.read_text(), flags=re.DOTALL)
+        assert re.findall(r"--\w+", prose) == [], page.name
+
+
+def test_the_list_of_commands_says_what_each_does(source: Path) -> None:
+    listed = (source / "reference" / "commands" / "index.md").read_text()
+    rows = re.findall(r"^\| \[`(.+?)`\]\((.+?)\.md\) \| \S.* \|$", listed, re.MULTILINE)
+    assert {page for _, page in rows} == {
+        path.stem for path in (source / "reference" / "commands").glob("gp-*.md")
+    }
+
+
+def test_no_link_shows_the_name_of_a_file_of_the_repository(source: Path) -> None:
+    shown = [
+        name for page in source.rglob("*.md") for name in re.findall(r"\[(\S+\.md)\]\(", page.read_text())
+    ]
+    assert shown == []
+
+
 def test_every_feature_has_a_page_from_the_one_table(source: Path) -> None:
     pages = {path.stem: path.read_text() for path in (source / "reference" / "features").glob("*.md")}
     assert pages.keys() == {*gp_core.CODES, "index"}

@@ -80,8 +80,8 @@ def add(commands: Subparsers) -> None:
     parser.add_argument(
         "touches",
         metavar="TOUCHES",
-        help=".dat, .csv, .mrk.json or .fcsv with three or more touches, of which a feature may have "
-        "several; or a pose that --json wrote, to estimate it again as it was, but for the options given",
+        help="file of three or more touches: .dat, .csv, .mrk.json or .fcsv (a feature may have several); "
+        "or a pose that --json wrote, to repeat its estimate, with other options where they are given",
     )
     add_names(parser)
     parser.add_argument("--side", choices=("L", "R"), help="side of the head; needed with a file of touches")

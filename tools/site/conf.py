@@ -48,7 +48,8 @@ napoleon_custom_sections = [("Yields", "returns_style")]
 autodoc_default_options = {"members": True, "member-order": "bysource", "show-inheritance": False}
 autodoc_typehints = "none"
 autodoc_class_signature = "mixed"
-copybutton_prompt_text = "$ "
+copybutton_prompt_text = r"\$ |>>> |\.\.\. "
+copybutton_prompt_is_regexp = True
 html_theme = "furo"
 html_title = "gp-labeler"
 html_logo = html_favicon = "../../resources/icons/gp-labeler.svg"

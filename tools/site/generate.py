@@ -65,10 +65,15 @@ APPLICATION = {
 
 def in_site(text: str) -> str:
     """Return a page of the top of the repository with links as they are in the site."""
-    text = re.sub(r"\]\(docs/", "](", text)
+    text = re.sub(r"\]\(docs/", "](", with_titles(text))
     for name in AT_TOP:
         text = text.replace(f"]({name}.md", f"]({name.lower()}.md")
     return text.replace("](CITATION.cff)", f"]({REPOSITORY}/blob/main/CITATION.cff)")
+
+
+def with_titles(text: str) -> str:
+    """Return a page whose links to pages show their titles, not the names of their files."""
+    return re.sub(r"\[[\w./-]+\.md\]\(", "[](", text)
 
 
 def first_pages() -> Iterator[tuple[str, str]]:
@@ -142,7 +147,12 @@ def python_entry(module: str, name: str) -> str:
 
 def index(title: str, pages: list[str]) -> str:
     """Return a page that lists others."""
-    return "\n".join([f"# {title}\n", "```{toctree}", ":maxdepth: 1\n", *pages, "```\n"])
+    return "\n".join([f"# {title}\n", toctree(pages, "maxdepth: 1")])
+
+
+def toctree(pages: list[str], option: str) -> str:
+    """Return the list of pages of a part of the site."""
+    return "\n".join(["```{toctree}", f":{option}\n", *pages, "```\n"])
 
 
 def parsers() -> Iterator[argparse.ArgumentParser]:
@@ -160,7 +170,7 @@ def command_page(parser: argparse.ArgumentParser) -> str:
     """Return the page of one command."""
     parts = [
         f"# {parser.prog}\n",
-        f"{parser.description}\n",
+        f"{prose(parser.description or '')}\n",
         "```text",
         parser.format_usage().strip(),
         "```\n",
@@ -172,7 +182,7 @@ def command_page(parser: argparse.ArgumentParser) -> str:
                 group.title or "", group.title
             )
             parts += [f"## {(title or '')[:1].upper()}{(title or '')[1:]}\n"]
-            parts += [group.description + "\n"] if group.description else []
+            parts += [prose(group.description) + "\n"] if group.description else []
             parts += ["| | |", "|---|---|", *(row(parser, action) for action in actions), ""]
     if parser.epilog:
         parts += ["## Examples\n", "```text", parser.epilog.strip(), "```\n"]
@@ -187,7 +197,12 @@ def row(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     formatter = parser._get_formatter()
     words = formatter._format_action_invocation(action)
     told = formatter._expand_help(action) if action.help else ""
-    return f"| `{cell(words)}` | {cell(html.escape(told, quote=False))} |"
+    return f"| `{cell(words)}` | {cell(prose(told))} |"
+
+
+def prose(help: str) -> str:
+    """Return text of a parser as Markdown: options are code, so that their hyphens do not become a dash."""
+    return re.sub(r"(?<![\w-])--[a-z][\w-]*", r"`\g<0>`", html.escape(help, quote=False))
 
 
 def cell(text: str) -> str:
@@ -197,18 +212,22 @@ def cell(text: str) -> str:
 
 def command_pages() -> Iterator[tuple[str, str]]:
     """Yield path and text of the page of each command."""
-    names = []
+    names, rows = [], []
     for parser in parsers():
-        names.append(parser.prog.replace(" ", "-"))
-        yield f"reference/commands/{names[-1]}.md", command_page(parser)
-    yield "reference/commands/index.md", index("Commands", names)
+        name = parser.prog.replace(" ", "-")
+        names.append(name)
+        rows.append(f"| [`{parser.prog}`]({name}.md) | {cell(prose(parser.description or ''))} |")
+        yield f"reference/commands/{name}.md", command_page(parser)
+    table = "\n".join(["| command | what it does |", "|---|---|", *rows, ""])
+    yield "reference/commands/index.md", f"# Commands\n\n{table}\n{toctree(names, 'hidden:')}"
 
 
 def assemble(folder: Path) -> None:
     """Write the source of the site into a folder."""
     shutil.copytree(ROOT / "docs", folder, dirs_exist_ok=True)
     for page in folder.rglob("*.md"):
-        page.write_text(pictures.with_screenshots(page.read_text(encoding="utf-8")), encoding="utf-8")
+        text = with_titles(pictures.with_screenshots(page.read_text(encoding="utf-8")))
+        page.write_text(text, encoding="utf-8")
     generated = (first_pages, python_pages, application_pages, command_pages, landmark_atlas.pages)
     for path, text in (page for pages in generated for page in pages()):
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
