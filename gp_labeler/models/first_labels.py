@@ -1,4 +1,4 @@
-"""First labels by themselves: suggestions from the lab's own labelled scans."""
+"""First labels: suggestions from the lab's own labelled scans, made in the background."""
 
 from __future__ import annotations
 

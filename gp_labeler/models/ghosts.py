@@ -1,4 +1,4 @@
-"""Ghosts: where the atlas expects a point that is to do."""
+"""Ghosts: where the atlas expects a point that is not placed yet."""
 
 from __future__ import annotations
 

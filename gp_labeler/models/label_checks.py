@@ -1,4 +1,4 @@
-"""What the checker says of the labels of a specimen, remembered, and told at once between two checks."""
+"""Findings of the label check of a specimen, kept so that they can be shown at once between two checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything that is written of an estimated pose, and an insertion path carried to it."""
+"""The files of an estimated pose, and an insertion path that is transformed to it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the user looks at the specimen, and where: nothing of it is saved with it, and undo leaves it alone."""
+"""What the views show, and where: nothing of this is saved with the specimen, and undo does not change it."""
 
 from __future__ import annotations
 

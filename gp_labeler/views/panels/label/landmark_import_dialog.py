@@ -1,4 +1,4 @@
-"""Taking over landmarks from files: what they hold, whether that can belong here, and what came of it."""
+"""The dialog that imports landmarks: what files contain, whether it fits the specimen, what was imported."""
 
 from __future__ import annotations
 

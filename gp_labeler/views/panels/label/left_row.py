@@ -30,7 +30,7 @@ class LeftRow(QWidget):
         self._workspace = workspace
         self.confirm = action_button(actions["head.confirm_left"], "Left is correct")
         self.exchanged = action_button(actions["head.left_is_right"], "The scan is mirrored…")
-        words = "Which side is left? The file says so, but a scan cannot prove it."
+        words = "Which side is left? The file states it, but a scan cannot prove it."
         self.question = text_label(words, "warning", wrap=True)
         answers = QWidget()
         row = FlowLayout(spacing=6)

@@ -1,4 +1,4 @@
-"""The card of the verdict: somebody looked at the estimate, and takes it or not."""
+"""The card of the verdict: a person accepts or rejects the estimate."""
 
 from __future__ import annotations
 

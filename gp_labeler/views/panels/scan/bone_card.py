@@ -1,4 +1,4 @@
-"""Where bone begins: the threshold over the histogram, tried out on the slices before it is taken."""
+"""The bone threshold over the histogram: shown on the slices while it is dragged, then applied."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The import dialog: what a scan's files say, what they do not say, and the answers to that."""
+"""The import dialog of scans: what the files state, what they leave open, and the user's answers."""
 
 from __future__ import annotations
 

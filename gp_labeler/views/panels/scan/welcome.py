@@ -1,4 +1,4 @@
-"""The first page: what to open, what was open before, and how it goes on."""
+"""The start page: what to open, what was opened before, and which steps follow."""
 
 from __future__ import annotations
 
