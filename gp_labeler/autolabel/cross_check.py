@@ -138,7 +138,8 @@ class _Head:
 def require_enough(scans: Sequence[LabelledScan]) -> None:
     """Raise `GpError` where scans are too few to be checked against each other."""
     if len(scans) < FEWEST_SCANS:
-        raise GpError(f"three labelled scans or more are needed, got {len(scans)}")
+        remedy = "Name more of them, or the folder that holds them."
+        raise GpError(f"three labelled scans or more are needed, got {len(scans)}", remedy=remedy)
 
 
 def check_predictions(scans: Sequence[LabelledScan], predictions: dict[str, Prediction]) -> LibraryCheck:

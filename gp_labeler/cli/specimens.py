@@ -137,7 +137,8 @@ def _make_sheets(args: argparse.Namespace) -> int:
 
     files = tuple(specimen_files(args.specimens))
     if not files:
-        raise GpError("holds no specimens (*.gpspecimen.json)", file=args.specimens[0])
+        remedy = "Name another folder, or the files themselves."
+        raise GpError("holds no specimens (*.gpspecimen.json)", file=args.specimens[0], remedy=remedy)
     with protected_inputs(files):
         job = MakeContactSheets(files, args.output, args.all_labellings)
         made = job.run(Progress(lambda fraction, text: None))

@@ -94,8 +94,9 @@ def make_step(kinds: Mapping[str, type[Step]], table: Any) -> Step:
     if does is None:
         raise GpError("has no key do", remedy=f"Give do = one of {', '.join(kinds)}.")
     if not isinstance(does, str) or does not in kinds:
+        near = _nearest(does, kinds)
         raise GpError(
-            f"unknown step {does!r:.40}{_nearest(does, kinds)}", remedy=f"There are {', '.join(kinds)}."
+            f"unknown step {does!r:.40}{near}", remedy="" if near else f"There are {', '.join(kinds)}."
         )
     return kinds[does].of({key: value for key, value in table.items() if key != "do"})
 

@@ -98,7 +98,7 @@ class Open(Step):
 
     def _open(self, driver: WindowDriver, path: Path) -> None:
         if not path.exists():
-            raise GpError("does not exist", file=path)
+            raise GpError("does not exist", file=path, remedy="Paths of inputs are relative to the script.")
         if path.name.endswith(SUFFIX):
             driver.workspace.open_specimen(path)
             return

@@ -52,7 +52,7 @@ def test_two_specimens_are_too_few(heads):
     folder, _ = heads
     for file in folder.glob("small-0*"):
         file.unlink()
-    with pytest.raises(GpError, match="three labelled scans or more are needed, got 2"):
+    with pytest.raises(GpError, match=r"three labelled scans or more are needed, got 2\. Name more"):
         CheckLibrary((folder,), folder, folder / "x.pdf").run(Progress(lambda fraction, text: None))
 
 

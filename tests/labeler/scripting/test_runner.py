@@ -124,7 +124,7 @@ def test_a_failing_step_stops_and_keeps_what_was_done(tmp_path) -> None:
 
 
 IMPOSSIBLE = (
-    ({"do": "open", "path": "none.nrrd"}, "does not exist"),
+    ({"do": "open", "path": "none.nrrd"}, "does not exist. Paths of inputs are relative to the script."),
     ({"do": "open"}, "a path, phantom"),
     ({"do": "place", "feature": "CO", "side": "L", "at": [0, 0, 0]}, "CO left cannot be chosen"),
     ({"do": "place", "feature": "XX", "side": "L", "at": [0, 0, 0]}, "unknown feature"),

@@ -86,6 +86,16 @@ def test_a_wrong_step_is_named_with_what_is_allowed(table, text) -> None:
     assert caught.value.number == 2
 
 
+def test_an_unknown_step_is_answered_by_the_nearest_or_else_by_all_steps() -> None:
+    with pytest.raises(StepError) as near:
+        make_script([{"do": "opne"}])
+    with pytest.raises(StepError) as far:
+        make_script([{"do": "xyzzy"}])
+    assert "did you mean open" in str(near.value)
+    assert "There are" not in str(near.value)
+    assert "There are open, " in str(far.value)
+
+
 @pytest.mark.parametrize(
     ("name", "text", "problem"),
     [
