@@ -1,4 +1,4 @@
-"""Every menu path that a page or a message names is in the menus: a renamed command leaves none behind."""
+"""Menu paths and buttons that pages and messages name are in the window, under the names of today."""
 
 from __future__ import annotations
 
@@ -27,11 +27,17 @@ def _on_pages() -> Iterator[tuple[str, str]]:
 
 def _in_messages() -> Iterator[tuple[str, str]]:
     """Return each module with each of its texts that names a path, from the path on."""
+    for module, text in _texts():
+        for found in re.finditer(rf"\b{_MENU} > ", text):
+            yield module, text[found.start() :]
+
+
+def _texts() -> Iterator[tuple[str, str]]:
+    """Return each module with each text in it."""
     for file in sorted((_ROOT / "gp_labeler").rglob("*.py")):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                for found in re.finditer(rf"\b{_MENU} > ", node.value):
-                    yield file.stem, node.value[found.start() :]
+                yield file.stem, node.value
 
 
 def _title(text: str) -> str:
@@ -74,4 +80,16 @@ def test_every_path_in_a_message_is_in_the_menus(entries) -> None:
     paths = list(_in_messages())
     assert len(paths) > 5
     missing = [(module, path) for module, path in paths if _missing(entries, path)]
+    assert not missing, missing
+
+
+def test_every_button_on_a_page_is_in_the_window() -> None:
+    """Those with an ellipsis: other words in italics need not be buttons."""
+    texts = {text for _, text in _texts()}
+    pages = {page.stem: " ".join(page.read_text(encoding="utf-8").split()) for page in _PAGES}
+    named = [
+        (page, name) for page, text in pages.items() for name in re.findall(r"\*([A-Z][^*>.]*…)\*", text)
+    ]
+    assert len(named) > 20
+    missing = [(page, name) for page, name in named if name not in texts]
     assert not missing, missing
