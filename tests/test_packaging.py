@@ -11,6 +11,7 @@ import sys
 import tarfile
 import zipfile
 from email.parser import Parser
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,10 @@ _NO_NETWORK = ("No matching distribution found", "Could not find a version")
 
 
 def _run(*command: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([str(w) for w in command], capture_output=True, text=True, check=False, cwd=cwd)
+    environment = {key: value for key, value in os.environ.items() if key != "QT_API"}
+    return subprocess.run(
+        [str(w) for w in command], capture_output=True, text=True, check=False, cwd=cwd, env=environment
+    )
 
 
 @pytest.fixture(scope="module")
@@ -242,6 +246,7 @@ def test_an_ordered_package_is_required_and_serves(package: str) -> None:
     assert module in _imported(_ROOT / room)
 
 
+@pytest.mark.skipif(not find_spec("PySide6"), reason="PySide6 is not installed")
 def test_pyside6_is_the_qt_that_qtpy_takes() -> None:
     assert re.search(r'^    "PySide6-Essentials>=[\d.]+', _requirements(), re.MULTILINE)
     code = "import sys, gp_labeler.views.theme, qtpy; print(qtpy.API_NAME, 'PySide6.QtCore' in sys.modules)"

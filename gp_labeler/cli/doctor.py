@@ -121,12 +121,13 @@ def _binding(found: Examination) -> None:
 def _packages(found: Examination) -> None:
     """Compare what is installed with what the distribution asks for."""
     absent = []
+    unused = () if os.environ.get("QT_API") == "pyside6" else ("pyside6-essentials",)  # another Qt is used
     for asked in requirements_of(_asked_for(found), _EXTRAS):
         version = asked.installed()
         found.note("Packages", f"{asked.name:24} {version or 'missing'}")
-        if version is None:
+        if version is None and asked.name not in unused:
             absent.append(asked.name)
-        elif not asked.allows(version):
+        elif version is not None and not asked.allows(version):
             wanted = f"{asked.name}{asked.bounds}"
             found.wrong.append(f'{asked.name} {version} does not fit. Run pip install "{wanted}"')
     if absent:

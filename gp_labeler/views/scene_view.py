@@ -11,13 +11,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from qtpy.QtCore import QEvent, Qt, QTimer, Signal
+from qtpy.QtCore import QEvent, QRect, Qt, QTimer, Signal
 from qtpy.QtGui import (
     QEnterEvent,
     QKeyEvent,
     QMouseEvent,
     QPainter,
     QPaintEvent,
+    QPixmap,
     QWheelEvent,
 )
 from qtpy.QtWidgets import QWidget
@@ -425,7 +426,7 @@ class SceneView(QWidget):
     def _is_screen(self, painter: QPainter) -> bool:
         """Whether a painter paints what is on the screen, and not a picture of it."""
         backing_store = getattr(self.window(), "backingStore", None)
-        if backing_store is None:  # PyQt6 does not wrap it; who takes a picture there calls `finish` before
+        if backing_store is None:  # PyQt6 does not wrap it; who grabs the window there calls `finish` before
             return True
         store = backing_store()
         return store is not None and painter.paintEngine().paintDevice() is store.paintDevice()
@@ -441,6 +442,11 @@ class SceneView(QWidget):
         if (self._stale or not self._finished) and self.canvas.prepare():
             with self.canvas.unseen():
                 self._draw(quick=False)
+
+    def grab(self, rectangle: QRect | None = None) -> QPixmap:
+        """Return a picture of the view, finished whichever binding Qt has."""
+        self.finish()
+        return super().grab() if rectangle is None else super().grab(rectangle)
 
     def draw_frame(self) -> None:
         """Draw the scene as it is now, the bone coarsely where it is new; called by the canvas."""

@@ -13,7 +13,7 @@ import pytest
 from gp_labeler.cli.subcommands import SUBCOMMANDS
 from gp_labeler.system.installation import explain_import
 from gp_labeler.system.libraries import NEEDS, Need, advice, missing, packages_of
-from gp_labeler.system.qt_binding import choose_binding
+from gp_labeler.system.qt_binding import BINDINGS, choose_binding
 from gp_labeler.system.requirements import Requirement, requirements_of
 
 pytestmark = pytest.mark.machine
@@ -70,7 +70,7 @@ def test_without_the_extra_it_says_how_to_install_it(command, tmp_path) -> None:
 
 
 def test_a_missing_system_library_is_named_with_what_brings_it(tmp_path) -> None:
-    done = run(tmp_path, "--demo", blocked=("PySide6",), library=True, DISPLAY=":0")
+    done = run(tmp_path, "--demo", blocked=tuple(BINDINGS.values()), library=True, DISPLAY=":0")
     refused(done, "the system library libEGL.so.1 is missing")
 
 

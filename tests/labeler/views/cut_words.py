@@ -12,7 +12,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from qtpy.QtCore import QPointF, QRect, QRectF, Qt
+from qtpy.QtCore import QPointF, QRect, QRectF, QSize, Qt
 from qtpy.QtGui import QFontMetricsF, QPainter
 from qtpy.QtWidgets import (
     QAbstractButton,
@@ -161,7 +161,7 @@ def _text(edit: QPlainTextEdit, own: tuple[str, ...]) -> Iterator[str]:
     if text and not edit.toPlainText():
         need = QFontMetricsF(edit.font()).boundingRect(QRectF(room), flags, text)
         if need.height() > room.height() + _SLACK or need.width() > room.width() + _SLACK:
-            yield f"{text!r} needs {need.size().toTuple()}, has {room.size().toTuple()}"
+            yield f"{text!r} needs {_size(need)}, has {_size(room)}"
 
 
 def _header(header: QHeaderView, own: tuple[str, ...]) -> Iterator[str]:
@@ -271,14 +271,18 @@ def _covered(root: QWidget) -> Iterator[str]:
             yield f"{_words_of(one)!r} and {_words_of(other)!r} lie on each other"
 
 
+def _size(thing: QWidget | QRect | QSize) -> tuple[int, int]:
+    return thing.width(), thing.height()
+
+
 def _off_screen(root: QWidget, screen: tuple[int, int]) -> Iterator[str]:
     width, height = screen
     if root.isWindow() and (root.width() > width or root.height() > height):
-        yield f"{type(root).__name__} {root.size().toTuple()} does not fit a screen of {screen}"
+        yield f"{type(root).__name__} {_size(root)} does not fit a screen of {screen}"
     for menu in root.findChildren(QMenu):
         size = menu.sizeHint()
         if size.width() > width or size.height() > height:
-            yield f"menu {menu.title()!r} {size.toTuple()} does not fit a screen of {screen}"
+            yield f"menu {menu.title()!r} {_size(size)} does not fit a screen of {screen}"
 
 
 # What widgets paint

@@ -29,8 +29,8 @@ SMALL, USUAL, LARGE = (853, 512), (1280, 800), (1366, 768)
 
 FAMILIES = ("DejaVu Sans", "Liberation Sans", "Noto Sans", "Inter")
 FULLEST = ("first page", "scan", "label, both sides", "pose, a mistouch", "atlas, tried out", "open a stack")
-TALL_MENUS = ((130, SMALL), (150, SMALL))
-"""Text sizes at which menus are taller than a screen: they scroll there."""
+LARGE_TEXT, LOW_SCREEN = 130, 533
+"""From this text size (percent) on, menus are taller than a screen of this height: they scroll there."""
 SCROLLS_SIDEWAYS = "DistanceMatrixView paints"
 """A table of all pairs of landmarks is wider than any screen, and may end in the middle of a column."""
 WHOLE = "GP_CUT_WORDS" in os.environ
@@ -93,13 +93,13 @@ def cut_in_looks(window: MainWindow, state: str, root: QWidget) -> Iterator[str]
             window.set_theme(theme)
         window.resize(*screen)
         if isinstance(root, QDialog | GuideWindow):
-            width, height = screen if isinstance(root, GuideWindow) else root.size().toTuple()
+            width, height = screen if isinstance(root, GuideWindow) else (root.width(), root.height())
             root.resize(min(width, screen[0]), min(height, screen[1]))
         lines = cut_words(root, own=OWN, screen=screen)
         if lines:  # a job that has just ended may have shown more, which Qt lays out with its next events
             QApplication.processEvents()
             lines = cut_words(root, own=OWN, screen=screen)
-        if (size, screen) in TALL_MENUS:
+        if size >= LARGE_TEXT and screen[1] <= LOW_SCREEN:
             lines = [line for line in lines if not line.startswith("menu ")]
         lines = [line for line in lines if not line.startswith(SCROLLS_SIDEWAYS)]
         yield from (f"{state}, {name}, {size} %, {screen}, {theme}: {line}" for line in lines)

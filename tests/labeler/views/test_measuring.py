@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, wait_until_idle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, image_bytes, wait_until_idle
 
 from gp_core import GpError, read_measurements
 from gp_core.landmarks.features import Side
@@ -175,9 +175,8 @@ def test_a_landmark_that_is_to_do_can_be_placed_on_an_end(window, axial) -> None
 def test_lines_and_names_are_painted_where_they_lie_in_the_slice(window, axial) -> None:
     def coloured() -> int:
         picture = axial.grab().toImage().convertToFormat(axial.grab().toImage().Format.Format_RGB888)
-        raw = np.frombuffer(picture.constBits(), np.uint8, picture.sizeInBytes())
-        rows = raw.reshape(picture.height(), -1)[:, : 3 * picture.width()].reshape(-1, 3).astype(int)
-        return int((np.abs(rows - [0xB9, 0xE3, 0x4B]).max(axis=1) < 40).sum())
+        rows = image_bytes(picture).reshape(picture.height(), -1)[:, : 3 * picture.width()]
+        return int((np.abs(rows.reshape(-1, 3).astype(int) - [0xB9, 0xE3, 0x4B]).max(axis=1) < 40).sum())
 
     few = coloured()
     window.workspace.measure.add([ONE, OTHER])

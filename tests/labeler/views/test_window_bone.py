@@ -59,8 +59,7 @@ def _moved(view, at: QPointF, modifiers):
 
 
 def colour_at(view, position) -> np.ndarray:
-    x, y = pixel(view, position).toTuple()
-    colour = view.grab().toImage().pixelColor(x, y)
+    colour = view.grab().toImage().pixelColor(pixel(view, position))
     return np.array([colour.red(), colour.green(), colour.blue()])
 
 

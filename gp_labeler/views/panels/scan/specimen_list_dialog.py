@@ -115,7 +115,8 @@ class SpecimenListDialog(QDialog):
     def _make_filter(self) -> None:
         self.words = text_label("", "hint")
         self.search = QLineEdit()
-        self.search.setPlaceholderText("Find: name, observer, note…")
+        self.search.setPlaceholderText("Find…")
+        self.search.setToolTip("Words in the name, the observers, the notes, or the names of the files")
         self.search.setAccessibleName("Find specimens")
         self.search.setClearButtonEnabled(True)
         self.search.textChanged.connect(lambda text: self._workspace.specimens.show(words=text))
