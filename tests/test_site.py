@@ -125,7 +125,7 @@ def test_the_habits_of_a_project_are_there() -> None:
 def test_the_invented_addresses_stand_in_one_place() -> None:
     folders = ("gp_core", "gp_labeler", "docs", "tools", "resources", "integrations", "benchmarks", ".github")
     files = [path for folder in folders for path in (_ROOT / folder).rglob("*") if path.is_file()]
-    files += [path for path in _ROOT.iterdir() if path.is_file()]
+    files += [path for path in _ROOT.iterdir() if path.is_file() and path.name != "PKG-INFO"]  # of an sdist
     address = "gp-labeler.github.io", "github.com/gp-labeler"
     named = {
         path.name

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from panel_cases import ATLAS, actions_of, cut_words, deliver, place, workspace_with_scan
 from qtpy.QtCore import Qt
+from window_cases import one_turn
 
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.provenance import Certainty
 from gp_labeler.commands.actions import run
+from gp_labeler.views.fonts import TEXT_SIZES
 from gp_labeler.views.panels.label.labellings_dialog import LabellingsDialog
 from gp_labeler.views.panels.label.panel import LabelPanel
+from gp_labeler.views.theme import DARK, apply_theme
 
 L, R = Side.LEFT, Side.RIGHT
 
@@ -75,6 +78,19 @@ def test_a_key_marks_the_point_that_was_placed_last(workspace):
     assert run("point.guess", workspace)
     assert workspace.document.state.landmark(L, "CA").certainty is Certainty.GUESS
     assert said == ["CA left: guess"]
+
+
+@pytest.mark.parametrize("percent", TEXT_SIZES)
+def test_no_heading_of_the_dialog_is_cut_however_narrow_it_is(workspace, qtbot, percent):
+    place(workspace, "CA", "CB")
+    dialog = LabellingsDialog(workspace)
+    qtbot.addWidget(dialog)
+    apply_theme(dialog, DARK, text_scale=percent / 100)
+    dialog.show()
+    dialog.resize(dialog.minimumSizeHint())
+    one_turn()
+    header = dialog.table.horizontalHeader()
+    assert all(header.sectionSize(n) >= header.sectionSizeHint(n) for n in range(header.count()))
 
 
 def test_the_dialog_begins_and_opens_labellings(workspace, qtbot):

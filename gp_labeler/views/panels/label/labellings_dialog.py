@@ -17,6 +17,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.labelling_edits import labelling_text, next_round
 from gp_labeler.models.labellings import LabellingRow, labelling_rows
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.fonts import fit
 from gp_labeler.views.layouts import STRETCH, in_column, in_row, wide
 from gp_labeler.views.panels.parts import fix_headers, open_at, text_label
 from gp_labeler.views.signals import attempt, follow
@@ -74,6 +75,7 @@ class LabellingsDialog(QDialog):
         self._lay_out()
         follow(self, workspace.document.labelling_changed, self.refresh)
         self.refresh()
+        fit(self, self._fit_columns)
         open_at(self, 620, 380)
 
     def refresh(self, *_: object) -> None:
@@ -89,7 +91,16 @@ class LabellingsDialog(QDialog):
                 self.table.setItem(n, column, item)
             if row.is_open:
                 self.table.selectRow(n)
+        self._fit_columns()
         self._refresh_buttons()
+
+    def _fit_columns(self) -> None:
+        """Make the table so wide that no heading is cut; the column of names takes what is left."""
+        header, table = self.table.horizontalHeader(), self.table
+        others = range(1, header.count())
+        widths = [max(header.sectionSizeHint(n), table.sizeHintForColumn(n)) for n in others]
+        margins = 2 * table.frameWidth() + table.verticalScrollBar().sizeHint().width()
+        table.setMinimumWidth(header.sectionSizeHint(0) + sum(widths) + margins)
 
     def _lay_out(self) -> None:
         in_column(
