@@ -348,8 +348,10 @@ def _questions(window: MainWindow, look: Look) -> None:
         def leave(name: str = name) -> None:
             dialog = QApplication.activeModalWidget()
             if dialog is not None:
-                look(name, dialog)
-                dialog.close()
+                try:
+                    look(name, dialog)
+                finally:
+                    dialog.close()  # else the test would wait for an answer for ever
 
         QTimer.singleShot(50, leave)
         ask()
