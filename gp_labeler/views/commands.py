@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from qtpy.QtCore import QObject, Qt, QTimer, Signal
+from qtpy.QtCore import QObject, Qt, Signal
 from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QMenu, QMenuBar, QWidget
 
@@ -13,7 +13,7 @@ from gp_labeler.commands.actions import ACTIONS, MENUS, Action, InWindow, run
 from gp_labeler.models.view import GREY_WINDOW
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.shortcuts_sheet import keys_text
-from gp_labeler.views.signals import follow
+from gp_labeler.views.signals import OncePerTurn, follow
 
 __all__ = ["Commands"]
 
@@ -75,8 +75,7 @@ class Commands(QObject):
     ) -> None:
         super().__init__(window)
         self._workspace, self._in_window = workspace, in_window
-        self._soon = QTimer(self, singleShot=True, interval=0)
-        self._soon.timeout.connect(self.refresh)
+        self._refresh_once = OncePerTurn(self.refresh, self)
         self.actions = {row.id: self._made(row, window, views) for row in ACTIONS.values()}
         for signal in (
             workspace.document.reset,
@@ -102,7 +101,7 @@ class Commands(QObject):
             workspace.jobs.failed,
             workspace.jobs.cancelled,
         ):
-            follow(self, signal, self._refresh_soon)
+            follow(self, signal, self._refresh_once.soon)
         follow(self, workspace.view.changed, self._on_view_changed)
         self.refresh()
 
@@ -126,23 +125,18 @@ class Commands(QObject):
                 if row.id == "file.demo" and self._workspace.recent is not None:
                     self._add_recent(menu)
 
-    def _refresh_soon(self, *_: object) -> None:
-        """Refresh once for all that is announced in one turn of the event loop."""
-        if not self._soon.isActive():
-            self._soon.start()
-
     def _on_view_changed(self, changed: frozenset[str]) -> None:
         if not changed <= GREY_WINDOW:  # no command depends on it, and a drag changes it all the time
-            self._refresh_soon()
+            self._refresh_once.soon()
 
     def flush(self) -> None:
         """Refresh now if anything was announced since: a key or a menu asks what can be done."""
-        if self._soon.isActive():
+        if self._refresh_once.isActive():
             self.refresh()
 
     def refresh(self) -> None:
         """Bring what can be done, and what is on, up to date."""
-        self._soon.stop()
+        self._refresh_once.stop()
         for row in ACTIONS.values():
             made = self.actions[row.id]
             made.setEnabled(row.enabled(self._workspace))

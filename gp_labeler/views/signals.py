@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from qtpy.QtCore import QObject, QSignalBlocker
+from qtpy.QtCore import QObject, QSignalBlocker, QTimer
 
 from gp_core.errors import GpError
 
-__all__ = ["attempt", "blocked", "follow"]
+__all__ = ["OncePerTurn", "attempt", "blocked", "follow"]
 
 
 class Teller(Protocol):
@@ -51,6 +51,27 @@ def follow(owner: QObject, signal: Any, slot: Callable[..., object]) -> None:
 
 _let_go: set[Callable[[], None]] = set()
 """Keeps these functions out of the garbage: PyQt would call one that the collector has cleared already."""
+
+
+class OncePerTurn(QTimer):
+    """Calls a method once for all that is announced in one turn of the event loop, after the turn.
+
+    Parameters
+    ----------
+    call : bound method
+        What to call; it may be called earlier, and then calls `stop`.
+    parent : QObject
+        Whose method it is.
+    """
+
+    def __init__(self, call: Callable[[], object], parent: QObject) -> None:
+        super().__init__(parent, singleShot=True, interval=0)
+        self.timeout.connect(call)
+
+    def soon(self, *_: object) -> None:
+        """Call after this turn; a slot for any signal."""
+        if not self.isActive():
+            self.start()
 
 
 def attempt(teller: Teller, action: Callable[[], object]) -> bool:

@@ -56,6 +56,7 @@ def test_certainty_and_note_are_edits_of_the_active_point(workspace, qtbot):
     assert not row.isVisible()
     place(workspace, "CA", "CB")
     workspace.labels.go_to(L, "CA")
+    one_turn()  # the card is refreshed once a turn
     assert row.isVisible()
     qtbot.mouseClick(row.buttons[Certainty.FAIR], Qt.MouseButton.LeftButton)
     qtbot.keyClicks(row.note, "fluid")
@@ -64,9 +65,11 @@ def test_certainty_and_note_are_edits_of_the_active_point(workspace, qtbot):
     assert (mark.certainty, mark.note) == (Certainty.FAIR, "fluid")
     assert workspace.document.undo_text == "note on CA left"
     workspace.labels.go_to(L, "CB")
+    one_turn()  # the card is refreshed once a turn
     assert row.note.text() == ""
     assert not row.buttons[Certainty.FAIR].isChecked()
     workspace.labels.go_to(L, "CA")
+    one_turn()  # the card is refreshed once a turn
     qtbot.mouseClick(row.buttons[Certainty.FAIR], Qt.MouseButton.LeftButton)
     assert workspace.document.state.landmark(L, "CA").certainty is None
 

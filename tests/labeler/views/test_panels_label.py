@@ -13,9 +13,10 @@ from panel_cases import (
     place,
 )
 from qtpy.compat import isalive
-from qtpy.QtCore import QCoreApplication, QEvent, QModelIndex, QPoint, QSize, Qt
+from qtpy.QtCore import QCoreApplication, QEvent, QModelIndex, QObject, QPoint, QSize, Qt
 from qtpy.QtGui import QFontMetrics, QGuiApplication
-from qtpy.QtWidgets import QApplication, QLabel, QMenu
+from qtpy.QtWidgets import QApplication, QLabel, QMenu, QWidget
+from window_cases import one_turn
 
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
 from gp_labeler.document.edits import CheckPoint, SwapPoints
@@ -272,6 +273,7 @@ def test_labels_of_the_other_side_are_swapped_by_the_primary_button(workspace, p
 def test_a_placed_point_can_be_checked_and_a_locked_one_unlocked(workspace, panel, qtbot):
     place(workspace, "CA")
     workspace.labels.go_to(LEFT, "CA")
+    one_turn()  # the card is refreshed once a turn
     qtbot.mouseClick(panel.card.primary, CLICK)
     assert workspace.document.state.landmark(LEFT, "CA").checked
     workspace.labels.lock(side=LEFT, code="CA")
@@ -292,6 +294,7 @@ def test_skip_unseen_and_side_buttons(workspace, panel, qtbot):
 
 def test_the_card_tells_common_mistakes_once_asked_and_for_all_that_follow(workspace, panel, qtbot):
     def told() -> str:
+        one_turn()  # the card is refreshed once a turn
         texts = [label.text() for label in panel.card.findChildren(QLabel) if label.isVisible()]
         return next((row.mistakes for row in FEATURES if row.mistakes in texts), "")
 
@@ -305,12 +308,38 @@ def test_the_card_tells_common_mistakes_once_asked_and_for_all_that_follow(works
     assert told() == ""
 
 
+class HeightsSeen(QObject):
+    """The heights that a widget takes from now on."""
+
+    def __init__(self, widget: QWidget) -> None:
+        super().__init__(widget)
+        self.seen: set[int] = set()
+        widget.installEventFilter(self)
+
+    def eventFilter(self, watched, event) -> bool:  # noqa: N802 - Qt's name
+        if event.type() is QEvent.Type.Resize:
+            self.seen.add(watched.height())
+        return False
+
+
+def test_the_card_keeps_its_height_while_points_are_placed_one_after_the_other(workspace, panel, qtbot):
+    """A point that is placed is not the active one for a moment: its row would move the table below."""
+    workspace.labels.go_to(LEFT, "CA")
+    one_turn()
+    heights = HeightsSeen(panel.card)
+    for _ in range(4):
+        place(workspace, workspace.labels.active.code)
+        one_turn()
+    assert heights.seen == set()
+
+
 def test_an_error_is_told_and_nothing_else_happens(workspace, panel, qtbot):
     told = []
     workspace.messages.said.connect(lambda text, level: told.append((text, level)))
     place(workspace, "CA")
     workspace.labels.lock(side=LEFT, code="CA")
     workspace.labels.go_to(LEFT, "CA")
+    one_turn()  # the card is refreshed once a turn
     assert not panel.card.unseen.isEnabled()
     assert not attempt(workspace, workspace.labels.clear)
     assert [level for _, level in told] == ["error"]
@@ -324,7 +353,7 @@ def test_everything_done_offers_the_export(workspace, panel, asked, qtbot):
             if not row.computed:
                 workspace.labels.mark_unseen(side=side, code=row.code)
     assert panel.card.content.name == "Everything is labelled"
-    QApplication.processEvents()  # commands are refreshed once a turn
+    one_turn()  # card and commands are refreshed once a turn
     qtbot.mouseClick(panel.card.primary, CLICK)
     assert asked == ["file.export"]
 

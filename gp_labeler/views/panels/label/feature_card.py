@@ -31,7 +31,7 @@ from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.label.annotation_row import AnnotationRow
 from gp_labeler.views.panels.label.card_content import CardContent, content_of
 from gp_labeler.views.shortcuts_sheet import keys_text
-from gp_labeler.views.signals import attempt, blocked, follow
+from gp_labeler.views.signals import OncePerTurn, attempt, blocked, follow
 from gp_labeler.views.stylesheet import set_role
 from gp_labeler.views.theme import theme_of
 
@@ -66,6 +66,7 @@ class FeatureCard(QWidget):
         super().__init__(parent)
         self._workspace, self._actions = workspace, actions
         self._content = CardContent("")
+        self._refresh_once = OncePerTurn(self.refresh, self)
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "card")
         self._make_widgets()
@@ -76,10 +77,17 @@ class FeatureCard(QWidget):
     @property
     def content(self) -> CardContent:
         """What it says now."""
+        self.flush()
         return self._content
+
+    def flush(self) -> None:
+        """Refresh now if anything was announced since."""
+        if self._refresh_once.isActive():
+            self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Show the active feature as it stands."""
+        self._refresh_once.stop()
         labels = self._workspace.labels
         self._content = now = content_of(
             labels,
@@ -191,7 +199,8 @@ class FeatureCard(QWidget):
             workspace.scan.opened,
             workspace.view.planes_changed,
         ):
-            follow(self, signal, self.refresh)
+            # a point that was placed is active for a moment only: to show it would move the table below
+            follow(self, signal, self._refresh_once.soon)
 
     def refresh_hidden(self) -> None:
         """Offer to cut the bone open where it hides the active feature, or where that is expected."""
