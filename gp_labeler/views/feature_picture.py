@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
-from qtpy.QtCore import QByteArray, QPointF, QRectF, QSize, Qt
+from qtpy.QtCore import QByteArray, QPointF, QRectF, QSize, Qt, QTimer
 from qtpy.QtGui import (
     QColor,
     QFont,
@@ -49,6 +49,9 @@ _MARGIN, _BESIDE = 26.0, 24.0
 """Kept free above and below, and for the directions at the sides; logical pixels."""
 _ROOMY = 180
 """Logical pixels: in a narrower picture only the feature itself is named."""
+
+_AFTER_MS = 20
+"""A picture takes some 10 ms to draw: the views, whose slices move with the feature, are painted first."""
 
 _LIGHT_BONE = "#B9A57E"
 """Bone on a light background."""
@@ -160,6 +163,8 @@ class FeaturePicture(QWidget):
         self._shown: tuple[str, Side] | None = None
         self._drawn = QPixmap()
         self._drawn_for: tuple[object, ...] = ()
+        self._draw_timer = QTimer(self, interval=_AFTER_MS, singleShot=True)
+        self._draw_timer.timeout.connect(self._draw)
         self.setMinimumSize(96, 72)
 
     def show_feature(self, code: str | None, side: Side) -> None:
@@ -177,15 +182,25 @@ class FeaturePicture(QWidget):
     def paintEvent(self, event: object) -> None:  # noqa: D102, N802 - Qt's name
         if self._shown is None:
             return
-        ratio, theme = self.devicePixelRatioF(), theme_of(self)
-        scale = text_scale(self)
-        key = (self._shown, self.size(), theme.name, ratio, scale, family())
-        if key != self._drawn_for:  # it is drawn again only where it changes: that takes some 10 ms
-            self._drawn_for = key
-            self._drawn = feature_picture(*self._shown, self.size(), theme, ratio=ratio, scale=scale)
+        if self._drawn_for != self._wanted and not self._draw_timer.isActive():
+            self._draw_timer.start()
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._drawn)
         painter.end()
+
+    @property
+    def _wanted(self) -> tuple[object, ...]:
+        """All that the picture depends on."""
+        look = theme_of(self).name, self.devicePixelRatioF(), text_scale(self), family()
+        return (self._shown, self.size(), *look)
+
+    def _draw(self) -> None:
+        if self._shown is None:
+            return
+        self._drawn_for = self._wanted
+        look = {"ratio": self.devicePixelRatioF(), "scale": text_scale(self)}
+        self._drawn = feature_picture(*self._shown, self.size(), theme_of(self), **look)
+        self.update()
 
 
 class _Picture:

@@ -47,7 +47,7 @@ from gp_labeler.views.panels.tracker.card import TrackerCard
 from gp_labeler.views.pose_display import PoseDisplay
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import ask_how_to_read, offer_other_scan
-from gp_labeler.views.signals import follow
+from gp_labeler.views.signals import OncePerTurn, follow
 from gp_labeler.views.status_line import StatusLine
 from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.top_bar import TopBar
@@ -122,6 +122,8 @@ class MainWindow(QMainWindow):
         self.pages, self.welcome = QStackedWidget(), Welcome(workspace, self.commands.actions)
         self.status = StatusLine(workspace)
         self._memory_return = MemoryReturn(workspace, self)
+        self._show_page_once = OncePerTurn(self._show_page, self)
+        self._show_views_once = OncePerTurn(self._show_views, self)
         self._dock()
         self._listen()
         self._recall_place()
@@ -226,8 +228,8 @@ class MainWindow(QMainWindow):
             self._label.addAction(self.commands.actions[id])  # Enter means it there too
         self._atlas.animal_asked.connect(self._on_finding_asked)
         self._atlas.repeatability.disagreement_asked.connect(self._on_disagreement_asked)
-        follow(self, workspace.scan.opened, self._show_page)
-        follow(self, workspace.document.reset, self._show_page)
+        follow(self, workspace.scan.opened, self._show_page_once.soon)
+        follow(self, workspace.document.reset, self._show_page_once.soon)
         follow(self, workspace.scan.import_asked, self._on_import_asked)
         follow(self, workspace.scan.differs, self._on_scan_differs)
         for signal in (
@@ -246,12 +248,18 @@ class MainWindow(QMainWindow):
         state = self.workspace.document.state
         is_open = state.volume is not None
         if is_open and self.pages.currentIndex() == 0:
+            self.grid.setUpdatesEnabled(False)
+            self._show_views_once.soon()
             self.set_step("label")
             self.grid.scene_view.setFocus()
         if not is_open and self.rail.step not in _ALONE:
             self.set_step("pose" if state.touches else "scan")
             self.welcome.refresh()
         self._arrange()
+
+    def _show_views(self) -> None:
+        """Paint the views in a turn after the panel beside them: the window answers in between."""
+        self.grid.setUpdatesEnabled(True)
 
     def _arrange(self) -> None:
         """Show the views beside a scan, a panel alone where its step needs none, else the first page."""

@@ -211,15 +211,15 @@ def test_the_picture_follows_feature_side_size_and_theme(qtbot):
         return is_same(on_screen(picture)[inside], wanted[inside])
 
     picture.show_feature("RWA", LEFT)
-    assert shows("RWA", LEFT, DARK)
+    qtbot.waitUntil(lambda: shows("RWA", LEFT, DARK))
     picture.show_feature("RWA", RIGHT)
-    assert shows("RWA", RIGHT, DARK)
+    qtbot.waitUntil(lambda: shows("RWA", RIGHT, DARK))
     picture.show_feature("IN", RIGHT)
-    assert shows("IN", RIGHT, DARK)
+    qtbot.waitUntil(lambda: shows("IN", RIGHT, DARK))
     apply_theme(picture, LIGHT)
-    assert shows("IN", RIGHT, LIGHT)
+    qtbot.waitUntil(lambda: shows("IN", RIGHT, LIGHT))
     picture.resize(160, 160)
-    assert shows("IN", RIGHT, LIGHT)
+    qtbot.waitUntil(lambda: shows("IN", RIGHT, LIGHT))
 
 
 @pytest.mark.parametrize("side", list(Side))

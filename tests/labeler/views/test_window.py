@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from qtpy.QtCore import Qt, QTimer
+from qtpy.QtCore import QEvent, QObject, Qt, QTimer
 from qtpy.QtTest import QTest
-from qtpy.QtWidgets import QMenu
+from qtpy.QtWidgets import QApplication, QMenu, QWidget
 from window_cases import MIDDLE, Answers, ball_volume, close, one_turn, wait_until_idle
 
 from gp_core.landmarks.features import Side
@@ -26,8 +26,10 @@ from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.scene.planes import Plane
 from gp_labeler.views.application import make_window as make_plain
+from gp_labeler.views.panels.label.landmark_table import LandmarkTable
 from gp_labeler.views.questions import offer_recoveries
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
+from gp_labeler.views.slice_view import SliceView
 from gp_labeler.views.top_bar import TopBar
 
 pytestmark = pytest.mark.machine
@@ -385,10 +387,37 @@ def test_a_specimen_is_opened_where_its_labelling_goes_on(qtbot, make_window, tm
     window = make_window()
     assert window.rail.step == "scan"
     window.open_path(saved)
-    assert window.rail.step == "label"
     assert window.steps["label"].card.content.name == "The scan is not open"
+    qtbot.waitUntil(lambda: window.rail.step == "label")
     wait_until_idle(qtbot, window)
     assert window.steps["label"].card.content.code == "CA"
+
+
+class PaintOrder(QObject):
+    """Tells in which turn of the event loop widgets of two kinds are painted first."""
+
+    def __init__(self, window: QWidget, *kinds: type[QWidget]) -> None:
+        super().__init__(window)
+        self.first: dict[type[QWidget], int] = {}
+        self._window, self._kinds, self._turn = window, kinds, 0
+        QApplication.instance().installEventFilter(self)
+
+    def eventFilter(self, watched, event) -> bool:  # noqa: N802 - Qt's name
+        if event.type() is QEvent.Type.UpdateRequest and watched is self._window:
+            self._turn += 1
+        if event.type() is QEvent.Type.Paint and isinstance(watched, self._kinds):
+            self.first.setdefault(type(watched), self._turn)
+        return False
+
+
+def test_the_panel_and_the_views_are_painted_in_turns_of_their_own(qtbot, make_window) -> None:
+    """Either takes some 20 ms: the window answers between begin, panel and views."""
+    window = make_window()
+    one_turn()
+    order = PaintOrder(window, LandmarkTable, SliceView)
+    window.workspace.scan.begin(ball_volume())
+    wait_until_idle(qtbot, window)
+    assert order.first[LandmarkTable] < order.first[SliceView]
 
 
 def test_every_menu_fits_a_small_screen_in_one_column(window) -> None:
