@@ -198,8 +198,8 @@ class FeaturePicture(QWidget):
         if self._shown is None:
             return
         self._drawn_for = self._wanted
-        look = {"ratio": self.devicePixelRatioF(), "scale": text_scale(self)}
-        self._drawn = feature_picture(*self._shown, self.size(), theme_of(self), **look)
+        ratio, scale = self.devicePixelRatioF(), text_scale(self)
+        self._drawn = feature_picture(*self._shown, self.size(), theme_of(self), ratio=ratio, scale=scale)
         self.update()
 
 
