@@ -6,14 +6,10 @@ when are left out as well: whoever runs the script does it again.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass, replace
-from enum import Enum
+from dataclasses import MISSING, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
-
-import msgspec
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -41,6 +37,7 @@ from gp_labeler.document.measurement_edits import (
     RenameMeasurement,
 )
 from gp_labeler.document.page_confirmation import ConfirmPage
+from gp_labeler.document.plain_values import plain, record_of
 from gp_labeler.document.specimen_edits import RenameSpecimen, SetNotes, SetThreshold
 from gp_labeler.document.state import How, Provenance
 from gp_labeler.document.touch_edits import (
@@ -84,12 +81,12 @@ def edit_table(edit: Edit) -> Table:
     """Return an edit as a table of texts, numbers, lists and tables, with who did it and when."""
     if isinstance(edit, ImportLandmarks):
         return {"do": edit.do, **(edit.asked or {})}
-    return {"do": edit.do, **_plain(edit)}
+    return {"do": edit.do, **plain(edit)}
 
 
 def script_table(edit: Edit) -> Table | None:
     """Return an edit as a step of a script; None where a table does not say all of it."""
-    return {"do": edit.do, **_plain(edit, anonymous=True)} if edit.do in EDITS else None
+    return {"do": edit.do, **plain(edit, left_out=_WHO_AND_WHEN)} if edit.do in EDITS else None
 
 
 def edit_of(table: Mapping[str, Any]) -> Any:
@@ -110,23 +107,12 @@ def edit_of(table: Mapping[str, Any]) -> Any:
         raise GpError(f"{do}: unknown key {key!r}{near_matches(key, known).lower()}", remedy=allowed)
     if any(field.name == "provenance" and field.default is MISSING for field in fields(kind)):
         given.setdefault("provenance", {"how": How.TYPED.value})
-    _check_finite(given, str(do))
     if isinstance(side := given.get("side"), str):
         given["side"] = Side.parse(side).value
     try:
-        return msgspec.convert(given, kind)
-    except msgspec.ValidationError as error:
-        problem, _, path = str(error).replace("`", "").partition(" - at $.")
-        where = f"{path}: " if path else ""
-        raise GpError(f"{do}: {where}{problem[:1].lower()}{problem[1:]}") from None
-
-
-def _check_finite(value: Any, where: str) -> None:
-    if isinstance(value, float) and not math.isfinite(value):
-        raise GpError(f"{where} must be finite, got {value!r}")
-    if isinstance(value, (Mapping, list)):
-        for key, each in value.items() if isinstance(value, Mapping) else enumerate(value):
-            _check_finite(each, f"{where}: {key}")
+        return record_of(kind, given, "")
+    except GpError as error:
+        raise GpError(f"{do}: {error.problem}", landmark=error.landmark, remedy=error.remedy) from None
 
 
 def redone(edit: Any, document: SpecimenDocument) -> Any:
@@ -148,23 +134,3 @@ def redone(edit: Any, document: SpecimenDocument) -> Any:
 
 def _touched_now(touch: Touch, document: SpecimenDocument) -> Touch:
     return replace(touch, time=document.now(), by=document.author)
-
-
-def _plain(value: Any, *, anonymous: bool = False) -> Any:
-    """Return texts, numbers, lists and tables; `anonymous` leaves out who did it and when."""
-    if isinstance(value, Enum):
-        return value.value
-    if is_dataclass(value):
-        left_out = _WHO_AND_WHEN if anonymous else ()
-        named = ((field, getattr(value, field.name)) for field in fields(value) if field.name not in left_out)
-        said = ((field.name, each) for field, each in named if not _is_default(field, each))
-        return {name: _plain(each, anonymous=anonymous) for name, each in said}
-    if isinstance(value, Mapping):
-        return {_plain(key): _plain(each, anonymous=anonymous) for key, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(each, anonymous=anonymous) for each in value]
-    return value
-
-
-def _is_default(field: Field[Any], value: Any) -> bool:
-    return field.default is not MISSING and bool(value == field.default)

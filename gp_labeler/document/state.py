@@ -166,8 +166,8 @@ class PoseCheck:
 
     side: Side
     verdict: str
-    by: str
-    time: str
+    by: str = ""
+    time: str = ""
     note: str = ""
     pose: Mapping[str, Any] = field(default_factory=dict)
 

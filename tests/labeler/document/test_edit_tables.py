@@ -100,7 +100,7 @@ def test_a_script_says_neither_who_nor_when_but_a_point_may_be_called_so():
         ({"do": "place_point", "side": "L", "code": "CA"}, "place_point: .*position"),
         (
             {"do": "place_point", "side": "L", "code": "CA", "position": [1, 2, "x"]},
-            r"place_point: position\[2\]: expected float, got str",
+            r"place_point: position\[2\] must be a number, got 'x'",
         ),
         (
             {"do": "record_touch", "side": "L", "name": "MN", "touch": {"position": [1, 2]}},

@@ -97,7 +97,7 @@ def test_the_file_keeps_the_frame_to_the_last_bit_and_files_without_one_open() -
     ("change", "words"),
     [
         ({"T_head_scan": [[1, 0, 0, 0]] * 4}, "not rigid"),
-        ({"T_head_scan": [[1, 0, 0]] * 4}, "four rows of four"),
+        ({"T_head_scan": [[1, 0, 0]] * 4}, r"T_head_scan\[0\] must be a list of length 4"),
         ({"foundBy": "luck"}, "found_by"),
         ({"shown": "yes"}, "headFrame.shown"),
     ],
