@@ -54,7 +54,7 @@ def plain(
     def said(each: Any) -> Any:
         if each is None or isinstance(each, _PLAIN):
             return each.value if isinstance(each, Enum) else each
-        if is_dataclass(each):
+        if is_dataclass(each) and not isinstance(each, type):
             there = ((name, getattr(each, name), default) for name, default in _fields_of(type(each)))
             return {
                 names.get(name, name): said(part)
