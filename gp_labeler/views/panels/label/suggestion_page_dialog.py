@@ -51,7 +51,7 @@ class SuggestionPageDialog(QDialog):
         self._listen()
         self.refresh()
         self.tiles[0].setFocus()
-        open_at(self, 1180, 740)
+        open_at(self, 1600, 760)
 
     def refresh(self, *_: object) -> None:
         """Show the page as it stands."""
