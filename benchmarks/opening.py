@@ -38,6 +38,8 @@ LEAST_MM = 10.0
 """A scan that is shorter than a head could be is asked about."""
 
 FIRST_PAINT = """
+from gp_labeler.cli.start import collect_seldom
+collect_seldom()
 from gp_labeler.views.application import make_window
 window = make_window()
 window.show()

@@ -16,7 +16,7 @@ try:
 except ImportError:  # another Python
     from signal import SIGINT, signal
 
-__all__ = ["core", "labeler", "window"]
+__all__ = ["collect_seldom", "core", "labeler", "window"]
 
 
 def core() -> int:
@@ -30,6 +30,7 @@ def core() -> int:
 def labeler() -> int:
     """Run ``gp-labeler``, to be stopped at once at any time: each edit is in the journal, files are whole."""
     _stop_at_once("gp-labeler")
+    collect_seldom()
     return int(_main_of("gp_labeler.cli.entry", "gp-labeler")())
 
 
@@ -39,6 +40,13 @@ def window() -> int:
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, PTH123
     return labeler()
+
+
+def collect_seldom() -> None:
+    """Look for cycles of objects seldom: those of a thousand modules are made at the start, and stay."""
+    import gc
+
+    gc.set_threshold(50_000)
 
 
 def _main_of(module: str, command: str) -> Callable[[], int]:

@@ -17,6 +17,9 @@ __all__ = ["collect_on_this_thread"]
 _INTERVAL_MS = 100
 """Short, so that there is little to look through each time."""
 
+_DUE = (700, 10, 10)
+"""New objects, or collections of the younger generation, after which one is due: as is usual in Python."""
+
 
 def collect_on_this_thread(application: QObject) -> None:
     """Stop the collector on all threads, and run it where an application has its event loop.
@@ -53,7 +56,7 @@ class _Collector(QObject):
             gc.collect()
             gc.freeze()
             return
-        generations = zip(gc.get_count(), gc.get_threshold(), strict=True)
-        due = [age for age, (count, threshold) in enumerate(generations) if count > threshold > 0]
+        counts = enumerate(zip(gc.get_count(), _DUE, strict=True))
+        due = [age for age, (count, most) in counts if count > most]
         if due:
             gc.collect(due[-1])
