@@ -28,6 +28,7 @@ from gp_core.io import read_points
 from gp_labeler.autolabel import LabelledScan, TemplateLibrary
 from gp_labeler.autolabel.confidence import GuessConfidence, HeldOut, centre_of, spread_of
 from gp_labeler.autolabel.cross_check import check_predictions
+from gp_labeler.autolabel.detours import detours_of
 from gp_labeler.autolabel.labelled_scan import flat_points
 from gp_labeler.autolabel.pose_search import find_pose
 from gp_labeler.autolabel.prediction import Prediction
@@ -223,7 +224,10 @@ def held_out_by(heads: dict[str, LabelledScan], carried: dict, name: str, others
         if len(found):
             errors[point] = float(np.linalg.norm(centre_of(found) - truth))
             spreads[point] = spread_of(found)
-    return HeldOut(name, errors, spreads)
+    labels = {other: heads[other].points for other in others}
+    between = {other: carried.get(other, {}) for other in others}
+    detours = detours_of({other: carried[name][other] for other in others}, labels, between)
+    return HeldOut(name, errors, spreads, detours)
 
 
 def run_guesses(heads: list[LabelledScan], args: argparse.Namespace) -> None:
@@ -248,7 +252,7 @@ def run_guesses(heads: list[LabelledScan], args: argparse.Namespace) -> None:
                 confidence = GuessConfidence(history)
                 own = held_out_by(by_name, carried, name, subset)
                 for point, error in own.errors.items():
-                    radius = confidence.radius_95(point, own.spreads[point])
+                    radius = confidence.radius_95(point, own.spreads[point], own.detours.get(point, np.nan))
                     rows.append((name, point, error, np.nan if radius is None else radius))
         tell_guesses(k, rows)
 

@@ -1,15 +1,18 @@
 """How far a guess may be off: from how the templates differ, and from how it went with the labelled heads.
 
 Every labelled head is predicted from the others. How far such predictions lay from the labels, feature by
-feature, is the history of the features. It also says how far off a guess is, over what templates and history
-let expect; so that the radii hold for any scheme of landmarks, species and scanner.
+feature, is the history of the features. With it go two signs of the scan itself: the spread between
+templates, and their detours (`gp_labeler.autolabel.detours`). How far off guesses are, over what these three
+let expect, is known of the labelled heads as well; so that the radii hold for any scheme of landmarks,
+species and scanner.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -17,11 +20,18 @@ from gp_core.validation import FloatArray
 
 __all__ = ["GuessConfidence", "HeldOut", "centre_of", "spread_of"]
 
-_SHARE_OF_SPREAD = 0.5
-_PRIOR_HEADS = 3.0
+_PRIOR_HEADS = 1.0
 """The history of one feature counts as if so many more heads had erred as all features do on average."""
 
-_LEVEL = 0.95
+_LEAST_SIGN = 0.1
+"""Of the history: what templates that agree by chance count for, at least."""
+
+_LEVEL_OVER_MEDIAN = 2.9
+"""95th percentile of errors over the expected ones, over their median, which varies less (dev-mice)."""
+
+_TO_HISTORY = 1.75
+"""Expected errors of one template by their history, over those of two by history and signs (dev-mice)."""
+
 _FEWEST = 12
 _GAUSSIAN_RADIUS = 1.61
 """95 % radius over root mean square, of an error that is Gaussian in three dimensions."""
@@ -35,13 +45,14 @@ class HeldOut:
     ----------
     name : str
         Of the specimen.
-    errors, spreads : mapping of str to float
-        By landmark, mm; a spread is NaN where one template alone predicted.
+    errors, spreads, detours : mapping of str to float
+        By landmark, mm; a spread or detour is NaN, or not there, where one template alone predicted.
     """
 
     name: str
     errors: Mapping[str, float]
     spreads: Mapping[str, float]
+    detours: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
 def centre_of(points: FloatArray) -> FloatArray:
@@ -96,7 +107,7 @@ class GuessConfidence:
         prior = float(np.mean(np.square(everything)))
         return float(np.sqrt((np.sum(np.square(own)) + _PRIOR_HEADS * prior) / (len(own) + _PRIOR_HEADS)))
 
-    def radius_95(self, name: str, spread: float) -> float | None:
+    def radius_95(self, name: str, spread: float, detour: float = np.nan) -> float | None:
         """Return the radius that holds a landmark with 95 %, mm; None while nothing is known.
 
         Parameters
@@ -105,28 +116,38 @@ class GuessConfidence:
             Of the landmark.
         spread : float
             How the templates differ, mm; see `spread_of`.
+        detour : float
+            How they differ by way of each other, mm; see `gp_labeler.autolabel.detours.detours_of`.
         """
-        expected = self._expected(name, spread)
+        expected = self._expected(name, spread, detour)
         return None if expected is None else self.factor * expected
 
     @cached_property
     def factor(self) -> float:
         """The 95 % radius over the expected error, as it was with the labelled heads."""
-        ratios = []
-        for head in self.history:
-            for name, error in head.errors.items():
-                expected = self._expected(name, head.spreads.get(name, float("nan")), without=head.name)
-                if expected is not None and expected > 0:
-                    ratios.append(error / expected)
+        ratios = [ratio for head in self.history for ratio in self._ratios(head)]
         if len(ratios) < _FEWEST:
             return _GAUSSIAN_RADIUS
-        return max(float(np.quantile(ratios, _LEVEL)), 1.0)
+        factor = max(_LEVEL_OVER_MEDIAN * float(np.median(ratios)), 1.0)
+        return factor if self._has_signs else _TO_HISTORY * factor
 
-    def _expected(self, name: str, spread: float, *, without: str | None = None) -> float | None:
-        """Return the expected error of a guess, mm, root mean square."""
-        known = self.history_of(name, without=without)
-        if known is None:
+    @property
+    def _has_signs(self) -> bool:
+        """Whether labelled heads were predicted by more than one template each."""
+        return not all(np.isnan(spread) for head in self.history for spread in head.spreads.values())
+
+    def _ratios(self, head: HeldOut) -> Iterator[float]:
+        """Yield the errors of one labelled head over what the other heads let expect."""
+        for name, error in head.errors.items():
+            signs = head.spreads.get(name, np.nan), head.detours.get(name, np.nan)
+            expected = self._expected(name, *signs, without=head.name)
+            if expected is not None and expected > 0:
+                yield error / expected
+
+    def _expected(self, name: str, *signs: float, without: str | None = None) -> float | None:
+        """Return how far off a guess is expected, mm: the geometric mean of its history and its signs."""
+        history = self.history_of(name, without=without)
+        if history is None:
             return None
-        if np.isnan(spread):
-            return known
-        return float(np.sqrt(_SHARE_OF_SPREAD * spread**2 + (1 - _SHARE_OF_SPREAD) * known**2))
+        known = [max(sign, _LEAST_SIGN * history) for sign in signs if not np.isnan(sign)]
+        return float(np.prod([history, *known]) ** (1 / (1 + len(known))))

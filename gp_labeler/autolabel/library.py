@@ -15,6 +15,7 @@ import numpy as np
 from gp_core.disk import read_json, write_text
 from gp_core.errors import FileFormatError, GpError
 from gp_labeler.autolabel.confidence import GuessConfidence, HeldOut
+from gp_labeler.autolabel.detours import detours_of
 from gp_labeler.autolabel.labelled_scan import LabelledScan
 from gp_labeler.autolabel.prediction import Carried, HeadNotFoundError, Prediction, predict
 from gp_labeler.autolabel.registration import Registration
@@ -148,7 +149,17 @@ class TemplateLibrary:
         """
         held_out = self.held_out(registration, report)
         counted = [scan for scan in self.scans if scan.name in held_out and scan.name not in without]
-        return GuessConfidence([_errors(scan, held_out[scan.name].without(without)) for scan in counted])
+        return GuessConfidence([self._errors(scan, held_out[scan.name].without(without)) for scan in counted])
+
+    def detours(self, prediction: Prediction) -> dict[str, float]:
+        """Return how far landmarks of a scan lie from where they come by way of another labelled scan, mm.
+
+        Nothing before the labelled scans were predicted from each other; see `held_out`, and
+        `gp_labeler.autolabel.detours.detours_of`.
+        """
+        labels = {scan.name: scan.points for scan in self.scans}
+        between = {name: found.carried for name, found in self._held_out.items() if found is not None}
+        return detours_of(prediction.carried, labels, between)
 
     def held_out(self, registration: Registration, report: Report | None = None) -> dict[str, Prediction]:
         """Return for each labelled scan where the others expect its landmarks.
@@ -264,11 +275,9 @@ class TemplateLibrary:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_text(path, json.dumps({name: xyz.tolist() for name, xyz in carried.items()}) + "\n")
 
-
-def _errors(scan: LabelledScan, prediction: Prediction) -> HeldOut:
-    errors, spreads = {}, {}
-    for name in prediction.names:
-        if name in scan.points:
-            errors[name] = float(np.linalg.norm(prediction.centres[name] - scan.points[name]))
-            spreads[name] = prediction.spreads[name]
-    return HeldOut(scan.name, errors, spreads)
+    def _errors(self, scan: LabelledScan, prediction: Prediction) -> HeldOut:
+        """Return how far a prediction of a labelled scan lies from its labels."""
+        known = [name for name in prediction.names if name in scan.points]
+        errors = {n: float(np.linalg.norm(prediction.centres[n] - scan.points[n])) for n in known}
+        spreads = {name: prediction.spreads[name] for name in known}
+        return HeldOut(scan.name, errors, spreads, self.detours(prediction))

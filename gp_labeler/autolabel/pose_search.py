@@ -147,17 +147,20 @@ def find_pose(volume: Volume, known: HeadSurface, report: Report | None = None) 
 def _bones(volume: Volume, known: HeadSurface) -> list[Bone]:
     """Return what may be the head's bone: all of it at each threshold, then island by island."""
     scan = coarse_scan(volume, known.radius / _VOXELS)
-    together, alone, problem = [], [], None
+    together, alone = [], []
     for level in threshold_candidates(scan):
         try:
             first, *others = Bone.islands(scan, level)
-        except GpError as error:
-            problem = error
+        except GpError:
             continue
         together.append(first)
         alone += others
     if not together:
-        raise problem or GpError("there is no bone", file=volume.path)
+        raise GpError(
+            "there is hardly any bone as large as that of the labelled heads",
+            file=volume.path,
+            remedy="Check the voxel size, and that the scan shows a head of the same species.",
+        )
     return [*together, *alone]
 
 

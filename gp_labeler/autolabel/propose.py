@@ -133,9 +133,10 @@ def propose(
         most=library.most,
         report=report.part(first, 1.0),
     )
+    detours = library.detours(prediction)
     if stored == "mirrored":
         prediction = _mirrored_prediction(prediction)
-    found, outside = _guesses(volume, prediction, confidence)
+    found, outside = _guesses(volume, prediction, confidence, detours)
     guesses = compare_with_atlas(found, atlas or Atlas.published())
     assert prediction.pose is not None
     score = prediction.pose.score
@@ -156,7 +157,7 @@ def propose(
 
 
 def _guesses(
-    volume: Volume, prediction: Prediction, confidence: GuessConfidence
+    volume: Volume, prediction: Prediction, confidence: GuessConfidence, detours: Mapping[str, float]
 ) -> tuple[list[Guess], list[str]]:
     """Return the guesses, and the names of what is expected beyond the edge of the scan."""
     guesses, outside = [], []
@@ -169,7 +170,7 @@ def _guesses(
             Guess(
                 name,
                 centre,
-                confidence.radius_95(name, spread),
+                confidence.radius_95(name, spread, detours.get(name, np.nan)),
                 None if np.isnan(spread) else spread,
                 confidence.history_of(name),
                 len(prediction.of(name)),

@@ -74,7 +74,8 @@ def carry(
     Returns
     -------
     dict of str to (3,) array
-        LPS mm in the target; also beyond its edge.
+        LPS mm in the target. What the pose puts beyond the edge of the scan stays there: nothing was
+        measured there to register, and the cut edges of bone would pull it in.
 
     Raises
     ------
@@ -93,7 +94,9 @@ def carry(
         if move is not None:
             found.update(zip(region.names, move(template.array(region.names)), strict=True))
     report(1.0)
-    return found
+    posed = rigid(template.array(names))
+    is_inside = target.whole.inside(posed)
+    return {name: found[name] if is_inside[n] else posed[n] for n, name in enumerate(names)}
 
 
 def _registered(

@@ -26,9 +26,10 @@ from gp_labeler.autolabel.registration_process import HereRegistration
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.suggestion_files import write_proposal
 from gp_labeler.autolabel.template import Template
+from gp_labeler.autolabel.transfer import TargetScan, carry
 from gp_labeler.cli.entry import main
-from gp_labeler.head_pose.surface_fit import angle_deg
-from gp_labeler.imaging.progress import Cancelled
+from gp_labeler.head_pose.surface_fit import Similarity, angle_deg
+from gp_labeler.imaging.progress import Cancelled, Report
 from gp_labeler.imaging.volume import Volume
 
 
@@ -354,3 +355,25 @@ def test_demons_are_said_to_be_coarser(monkeypatch):
     assert engine_named() == "demons"
     with pytest.raises(GpError, match="picsl_greedy is not installed"):
         engine_named("greedy")
+
+
+class EverythingByThreeMm:
+    """A registration that moves all that it is given to the left."""
+
+    name = "greedy"
+
+    def register(self, fixed, moving, step, iterations, cancel=None):
+        return np.broadcast_to(np.float32([3.0, 0.0, 0.0]), (*fixed.shape, 3))
+
+
+def test_what_lies_beyond_a_cut_stays_there_and_is_not_pulled_to_the_edge():
+    scan, settings = labelled(0), Settings()
+    volume = scan.load()
+    half = Volume(np.asarray(volume.array)[:, :, : volume.size[0] // 2], volume.T_scan_voxel)
+    target = TargetScan(half, 500.0, 1.0)
+    here = Similarity(1.0, np.eye(3), np.zeros(3))
+    found = carry(Template.of(scan, settings), target, here, EverythingByThreeMm(), settings, Report())
+    moved = {name: np.linalg.norm(found[name] - xyz) for name, xyz in scan.points.items()}
+    beyond = {name for name, xyz in scan.points.items() if not half.contains(xyz[None])[0]}
+    assert 2 <= len(beyond) <= 6
+    assert {name for name, mm in moved.items() if mm < 1e-9} == beyond
