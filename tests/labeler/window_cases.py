@@ -159,6 +159,7 @@ def _never_let_go(alive: Callable[[], Counter[str]], patience_s: float = LET_GO_
     end = time.monotonic() + patience_s
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     left = alive()
+    gc.unfreeze()  # what the program leaves out until it rests
     while left:
         gc.collect()  # windows and their parts know each other
         one_turn()

@@ -196,6 +196,7 @@ def cycles(trial: Trial) -> dict:
         del top, view
         QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
         QTest.qWait(20)
+        gc.unfreeze()  # as the program does when its window rests
         gc.collect()
         files.append(len(list(Path("/proc/self/fd").iterdir())))
         memory.append(int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
+from qtpy.QtCore import QObject
 from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_labeler.jobs.runner import Jobs
@@ -80,6 +81,18 @@ def test_what_modules_hold_is_left_out_once_they_are_imported(qtbot, monkeypatch
     qtbot.waitUntil(lambda: destroyed_on == [threading.main_thread()])  # garbage is collected before
     looked_through = {id(each) for each in gc.get_objects()}
     assert not looked_through & {id(each) for each in held}
+
+
+def test_what_was_left_out_is_looked_through_when_the_window_rests(qtbot):
+    """Else a dialog that was open while modules were imported would stay for ever."""
+    destroyed_on: list[threading.Thread] = []
+    dialog = Dialog(destroyed_on)
+    owner = QObject()
+    collect_on_this_thread(owner, rest_s=0.3)  # what is alive now is left out
+    del dialog
+    gc.collect()
+    assert destroyed_on == []
+    qtbot.waitUntil(lambda: destroyed_on == [threading.main_thread()])
 
 
 def test_asked_twice_there_is_one_collector(qtbot):
