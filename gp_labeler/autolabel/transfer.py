@@ -95,7 +95,7 @@ def carry(
             found.update(zip(region.names, move(template.array(region.names)), strict=True))
     report(1.0)
     posed = rigid(template.array(names))
-    is_inside = target.whole.inside(posed)
+    is_inside = target.volume.contains(posed)
     return {name: found[name] if is_inside[n] else posed[n] for n, name in enumerate(names)}
 
 

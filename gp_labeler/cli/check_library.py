@@ -93,6 +93,6 @@ def _check(args: argparse.Namespace) -> int:
         sys.stdout.write("".join(f"  {finding.text}\n" for finding in found))
     for name in check.unchecked:
         sys.stdout.write(f"{name}: the head was not found, so its labels were not checked\n")
-    if drawn:
-        sys.stdout.write(f"pictures: {', '.join(map(shown_path, drawn))}\n")
+    if args.pictures:
+        sys.stdout.write(f"pictures: {', '.join(map(shown_path, drawn)) or 'none: nothing to review'}\n")
     return 1 if check.findings else 0

@@ -200,7 +200,7 @@ def _tell(result: HeadResult) -> None:
     doubtful = [guess["name"] for guess in about["guesses"] if guess["doubtful"]]
     written = "kept from an earlier run" if result.is_earlier else ", ".join(f.name for f in result.files)
     sys.stdout.write(
-        f"{result.path.name}: {len(about['guesses'])} suggestions from {scans_text(len(about['templates']))}"
+        f"{result.path.name}: {_count(about['guesses'])} from {scans_text(len(about['templates']))}"
         f"{_radii(about['guesses'])}; {written}\n"
     )
     if doubtful:
@@ -209,6 +209,10 @@ def _tell(result: HeadResult) -> None:
         sys.stdout.write(f"{result.path.name}: beyond the edge of the scan: {' '.join(about['outside'])}\n")
     for warning in about["warnings"]:
         sys.stderr.write(f"gp-labeler: {result.path.name}: {warning}\n")
+
+
+def _count(guesses: Sequence[Mapping[str, Any]]) -> str:
+    return "1 suggestion" if len(guesses) == 1 else f"{len(guesses)} suggestions"
 
 
 def _radii(guesses: Sequence[Mapping[str, Any]]) -> str:
