@@ -11,6 +11,9 @@ Examples
 ()
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.label_check import Deviation, Finding, SideCheck, check_side, check_specimen
@@ -60,16 +63,18 @@ from gp_core.registration.fiducials import register_fiducials
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
 from gp_core.registration.result import RegistrationResult
-from gp_core.study.compare import ComparisonReport, compare
-from gp_core.study.conditions import ConditionsReport, conditions, touch_conditions
-from gp_core.study.distance_check import DistanceCheck, PairDistance, check_distances
-from gp_core.study.distances import DistanceTable, distances
-from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
-from gp_core.study.nested_search import NestedReport, nested_search
-from gp_core.study.physical import PhysicalReport, physical_test
-from gp_core.study.reliability import ReliabilityReport, reliability
-from gp_core.study.simulation import SimulationReport, simulate
-from gp_core.study.subset_search import SearchReport, search_features
+
+if TYPE_CHECKING:
+    from gp_core.study.compare import ComparisonReport, compare
+    from gp_core.study.conditions import ConditionsReport, conditions, touch_conditions
+    from gp_core.study.distance_check import DistanceCheck, PairDistance, check_distances
+    from gp_core.study.distances import DistanceTable, distances
+    from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
+    from gp_core.study.nested_search import NestedReport, nested_search
+    from gp_core.study.physical import PhysicalReport, physical_test
+    from gp_core.study.reliability import ReliabilityReport, reliability
+    from gp_core.study.simulation import SimulationReport, simulate
+    from gp_core.study.subset_search import SearchReport, search_features
 
 __version__ = "0.1.0"
 
@@ -78,6 +83,32 @@ FiducialRegistration = RegistrationResult
 
 Departure = Deviation
 """Earlier name of `Deviation`."""
+
+_OF_STUDIES = {
+    "ComparisonReport": "gp_core.study.compare",
+    "ConditionsReport": "gp_core.study.conditions",
+    "DistanceCheck": "gp_core.study.distance_check",
+    "DistanceTable": "gp_core.study.distances",
+    "LeaveOneOutReport": "gp_core.study.leave_one_out",
+    "NestedReport": "gp_core.study.nested_search",
+    "PairDistance": "gp_core.study.distance_check",
+    "PhysicalReport": "gp_core.study.physical",
+    "ReliabilityReport": "gp_core.study.reliability",
+    "SearchReport": "gp_core.study.subset_search",
+    "SimulationReport": "gp_core.study.simulation",
+    "check_distances": "gp_core.study.distance_check",
+    "compare": "gp_core.study.compare",
+    "conditions": "gp_core.study.conditions",
+    "distances": "gp_core.study.distances",
+    "leave_one_out": "gp_core.study.leave_one_out",
+    "nested_search": "gp_core.study.nested_search",
+    "physical_test": "gp_core.study.physical",
+    "reliability": "gp_core.study.reliability",
+    "search_features": "gp_core.study.subset_search",
+    "simulate": "gp_core.study.simulation",
+    "touch_conditions": "gp_core.study.conditions",
+}
+"""The module of each name that is imported at its first use: most programs run no study."""
 
 MOVED_MODULES = {
     "gp_core.atlas.draw": "gp_core.atlas.sampling",
@@ -202,3 +233,16 @@ __all__ = [
     "write_measurements",
     "write_suggestions",
 ]
+
+if not TYPE_CHECKING:  # type checkers know all names, and no others
+
+    def __getattr__(name: str) -> Any:
+        """Import what belongs to studies when it is first asked for."""
+        if name not in _OF_STUDIES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        globals()[name] = found = getattr(import_module(_OF_STUDIES[name]), name)
+        return found
+
+    def __dir__() -> list[str]:
+        """Return all names, those that are not imported yet, too."""
+        return sorted({*globals(), *__all__})

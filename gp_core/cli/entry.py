@@ -5,27 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
 from gp_core import __version__
-from gp_core.cli import (
-    check,
-    compare,
-    conditions,
-    distances,
-    draw,
-    estimate,
-    fit,
-    import_mat,
-    leave_one_out,
-    physical,
-    pivot,
-    register,
-    reliability,
-    search,
-    serve,
-    simulate,
-    touches,
-)
 from gp_core.cli.options import keeping_inputs, streams_of
 from gp_core.command_line import CommandParser, add_completion
 from gp_core.errors import GpError
@@ -35,28 +17,34 @@ from gp_core.terminal import leave_output, plain_terminal
 __all__ = ["main", "make_parser"]
 
 _COMMANDS = (
-    estimate,
-    serve,
-    register,
-    pivot,
-    touches,
-    fit,
-    import_mat,
-    check,
-    reliability,
-    distances,
-    leave_one_out,
-    search,
-    simulate,
-    compare,
-    physical,
-    conditions,
-    draw,
+    "estimate",
+    "serve",
+    "register",
+    "pivot",
+    "touches",
+    "fit",
+    "import-mat",
+    "check",
+    "reliability",
+    "distances",
+    "leave-one-out",
+    "search",
+    "simulate",
+    "compare",
+    "physical",
+    "conditions",
+    "draw",
 )
+"""Each is written in the module of its name, and imported where it is run or all are listed."""
 
 
-def make_parser() -> argparse.ArgumentParser:
-    """Return the parser with all commands.
+def make_parser(names: Sequence[str] = _COMMANDS) -> argparse.ArgumentParser:
+    """Return the parser.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The commands that it knows; by default all of them.
 
     Returns
     -------
@@ -70,8 +58,8 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"gp-core {__version__}")
     add_completion(parser)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for module in _COMMANDS:
-        module.add(commands)
+    for name in names:
+        import_module(f"gp_core.cli.{name.replace('-', '_')}").add(commands)
     return parser
 
 
@@ -95,7 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    args = make_parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    args = make_parser([name for name in _COMMANDS if name in given[:1]] or _COMMANDS).parse_args(given)
     try:
         with streams_of(args), keeping_inputs(args):
             status: int = args.run(args)
