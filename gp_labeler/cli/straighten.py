@@ -30,6 +30,7 @@ _EXAMPLE = """examples:
   gp-labeler straighten head.nrrd --landmarks GP-014_L.mrk.json GP-014_R.mrk.json
   gp-labeler straighten head.nrrd --midline 1 -40 2 --left 12 0 5 --right -11 1 5
   gp-labeler straighten two-heads.nrrd --near 21 -15 4
+  gp-labeler straighten mouse.nrrd --like mouse-1.gpspecimen.json
 
 The scan is not changed. Left and right are those of the file; a scan cannot prove them.
 """
@@ -55,6 +56,12 @@ def make_straighten_parser() -> argparse.ArgumentParser:
         nargs=3,
         metavar=("X", "Y", "Z"),
         help="in a scan of several heads, a point in the one that is meant, LPS mm",
+    )
+    parser.add_argument(
+        "--like",
+        type=Path,
+        metavar="SPECIMEN",
+        help="specimen file of a straightened head of the same species: it gives front, up and pitch",
     )
     points = parser.add_argument_group("from points, if the symmetry of the bone is not sufficient")
     points.add_argument(
@@ -88,7 +95,8 @@ def _straighten(args: argparse.Namespace) -> int:
     from gp_labeler.imaging.readers import read_volume  # here: `--help` need not wait for it
 
     slices = args.volume.iterdir() if args.volume.is_dir() else ()
-    with protected_inputs([args.volume, *slices, *(args.landmarks or ())]):
+    like = () if args.like is None else (args.like,)
+    with protected_inputs([args.volume, *slices, *like, *(args.landmarks or ())]):
         volume = read_volume(args.volume, **import_options(args))
         pose = _pose(volume, args)
         if args.json is not None:
@@ -113,7 +121,7 @@ def _check_points(args: argparse.Namespace) -> None:
         raise GpError(f"--midline, --left and --right belong together, got --{' and --'.join(given)} alone")
     if given and args.landmarks:
         raise GpError("give --landmarks, or --midline, --left and --right, not both")
-    for name in ("box", "near"):
+    for name in ("box", "near", "like"):
         if getattr(args, name) is not None and (given or args.landmarks):
             raise GpError(f"--{name} is for straightening without points")
     if args.threshold is not None and not np.isfinite(args.threshold):
@@ -122,6 +130,7 @@ def _check_points(args: argparse.Namespace) -> None:
 
 def _pose(volume: Volume, args: argparse.Namespace) -> HeadPose:
     from gp_core import load_specimens
+    from gp_labeler.document.head_template import read_head_template
     from gp_labeler.head_pose import straighten, straighten_by_landmarks, straighten_by_points
 
     if args.midline is not None:
@@ -130,7 +139,8 @@ def _pose(volume: Volume, args: argparse.Namespace) -> HeadPose:
         )
     if not args.landmarks:
         box = None if args.box is None else np.sort(np.reshape(args.box, (2, 3)), axis=0)
-        return straighten(volume, threshold=args.threshold, box=box, near=args.near)
+        template = None if args.like is None else read_head_template(args.like)
+        return straighten(volume, threshold=args.threshold, box=box, near=args.near, template=template)
     specimens = load_specimens(args.landmarks)
     if len(specimens) != 1:
         raise GpError(f"--landmarks must be of one animal, got {', '.join(s.name for s in specimens)}")

@@ -81,6 +81,8 @@ def frame_rows() -> Iterator[Action]:
 
     yield row("head.straighten", "Straighten the head", ("Ctrl+H",), lambda w: w.head.straighten(),
               _can_straighten, hint="Align the views with the head, found by the symmetry of its bone")
+    yield row("head.like", "Straighten like another head…", (), IN_WINDOW, _can_straighten,
+              hint="Front, up and pitch are taken from a saved specimen of the same species")
     yield row("head.by_landmarks", "Straighten by the placed landmarks", (),
               lambda w: w.head.straighten_by_landmarks(), _can_straighten,
               hint="Uses IN and a pair such as OI, or two pairs; refined by the symmetry of the bone")

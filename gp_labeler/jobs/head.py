@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -27,6 +28,8 @@ class Straighten:
     volume: Volume
     threshold: float | None = None
     near: tuple[float, float, float] | None = None
+    like: Path | None = None
+    """Specimen file of a straightened head that says which way is front and up."""
 
     @property
     def title(self) -> str:
@@ -36,12 +39,15 @@ class Straighten:
     def run(self, progress: Progress) -> HeadPose:
         """Search the mid-plane, then front and up."""
         load_modules(*_MODULES)
+        from gp_labeler.document.head_template import read_head_template
         from gp_labeler.head_pose import straighten
 
+        template = None if self.like is None else read_head_template(self.like, cancel=progress.cancelled)
         return straighten(
             self.volume,
             threshold=self.threshold,
             near=self.near,
+            template=template,
             progress=progress,
             cancel=progress.cancelled,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -174,13 +175,16 @@ class HeadModel:
 
     # Straightening
 
-    def straighten(self, near: ArrayLike | None = None) -> None:
+    def straighten(self, near: ArrayLike | None = None, *, like: Path | None = None) -> None:
         """Find the head by the symmetry of its bone, in the background.
 
         Parameters
         ----------
         near : (3,) array_like, LPS mm, optional
             In a scan of several heads, a point in the one that is meant: the crosshair goes there, too.
+        like : Path, optional
+            Specimen file of a straightened head, which says which way is front and up, and the pitch; by
+            default the synthetic guinea pig does.
 
         Raises
         ------
@@ -190,7 +194,7 @@ class HeadModel:
         point = None if near is None else as_position(near, "near")
         if point is not None:
             self._view.set_crosshair(point)
-        self._submit(Straighten(self._volume(), self._document.state.threshold, point))
+        self._submit(Straighten(self._volume(), self._document.state.threshold, point, like))
 
     def straighten_by_landmarks(self) -> None:
         """Find the head by the landmarks of both sides: IN and a pair, or two pairs."""

@@ -28,6 +28,9 @@ class StraightenHead(Step):
         The points, scan mm: one of the midline, and the same place on both sides.
     near : three numbers, optional
         In a scan of several heads, a point in the one that is meant, scan mm; for ``symmetry``.
+    like : str, optional
+        Specimen file of a straightened head, which says which way is front and up, and the pitch; for
+        ``symmetry``. By default the synthetic guinea pig does.
     left_confirmed : bool
         Whether left is known to be left as the file says; nothing in a scan can prove it.
     """
@@ -39,6 +42,7 @@ class StraightenHead(Step):
     left: Triple | None = None
     right: Triple | None = None
     near: Triple | None = None
+    like: str | None = None
     left_confirmed: bool = False
 
     def __post_init__(self) -> None:
@@ -50,14 +54,15 @@ class StraightenHead(Step):
             raise GpError("straighten: by = 'points' needs midline, left and right")
         if self.by != "points" and given:
             raise GpError(f"straighten: {given[0]} is for by = 'points'")
-        if self.by != "symmetry" and self.near is not None:
-            raise GpError("straighten: near is for by = 'symmetry'")
+        for name in ("near", "like"):
+            if self.by != "symmetry" and getattr(self, name) is not None:
+                raise GpError(f"straighten: {name} is for by = 'symmetry'")
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         head = driver.workspace.head
         before = head.frame
         if self.by == "symmetry":
-            head.straighten(self.near)
+            head.straighten(self.near, like=None if self.like is None else driver.to_read(self.like))
         elif self.by == "landmarks":
             head.straighten_by_landmarks()
         else:

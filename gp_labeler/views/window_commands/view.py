@@ -11,6 +11,7 @@ from qtpy.QtCore import Qt
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
+from gp_labeler.document.specimen_file import SUFFIX
 from gp_labeler.models.typed_position import typed_position
 from gp_labeler.models.view import CUTS
 from gp_labeler.models.workspace import Workspace
@@ -43,6 +44,12 @@ def zoom_to_point(window: MainWindow) -> None:
         workspace.labels.go_to(active.side, active.code)
     for view in window.grid.views:
         view.zoom_to(workspace.view.crosshair, CLOSE_MM)
+
+
+def ask_straighten_like(workspace: Workspace, prompts: Prompts) -> None:
+    """Ask for a straightened head of the same species, and straighten this one with it as the template."""
+    for file in prompts.open_files("Straighten like which head?", f"Specimens (*{SUFFIX})"):
+        workspace.head.straighten(like=file)
 
 
 def ask_position(workspace: Workspace, prompts: Prompts) -> None:
@@ -162,6 +169,7 @@ VIEW_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
         "view.text_smaller": partial(change_text_size, step=-1),
         "view.text_normal": partial(change_text_size, step=0),
         "view.canvas": lambda window: ask_canvas(window, window.prompts),
+        "head.like": Asking(ask_straighten_like),
         "head.left_is_right": Asking(ask_reopen_mirrored),
     }
 )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from document_cases import head_frame
 from script_cases import SPECIMEN, content, place, run
-from window_cases import MIDDLE, VOXEL_MM
+from window_cases import MIDDLE, VOXEL_MM, Answers, ball_volume
 
+from gp_core.errors import GpError
 from gp_labeler.document.edit_tables import script_table
 from gp_labeler.document.head_edits import SetHeadFrame
 from gp_labeler.jobs.head import Straighten
@@ -54,6 +57,7 @@ def test_the_head_is_turned_by_hand_and_what_is_refused_ends_the_script(tmp_path
         ({"do": "straighten", "by": "points", "midline": [0, 0, 0]}, "needs midline, left and right"),
         ({"do": "straighten", "left": [0, 0, 0]}, "is for by = 'points'"),
         ({"do": "straighten", "by": "landmarks", "near": [0, 0, 0]}, "is for by = 'symmetry'"),
+        ({"do": "straighten", "by": "landmarks", "like": "a.gpspecimen.json"}, "is for by = 'symmetry'"),
         ({"do": "view", "plane": "up"}, "plane must be one of"),
         ({"do": "view", "frame": "atlas"}, "frame must be one of"),
         ({"do": "view", "turn": {"3d": 4.0}}, "turn must be one of"),
@@ -63,6 +67,30 @@ def test_the_head_is_turned_by_hand_and_what_is_refused_ends_the_script(tmp_path
 def test_steps_that_cannot_be_done_are_refused_before_any_is(table, words) -> None:
     with pytest.raises(StepError, match=words):
         make_script([table])
+
+
+def test_step_and_menu_take_another_head_as_the_template(tmp_path, monkeypatch) -> None:
+    asked: list[Path | None] = []
+
+    def remember(job: Straighten, progress: object) -> None:
+        asked.append(job.like)
+        raise GpError("enough")
+
+    monkeypatch.setattr(Straighten, "run", remember)
+    file = tmp_path / "one.gpspecimen.json"
+    file.write_text("{}")
+    report = run(tmp_path, {"do": "straighten", "like": file.name})
+    assert "enough" in report.error
+    driver = WindowDriver(tmp_path, tmp_path)
+    try:
+        driver.window.workspace.scan.begin(ball_volume())
+        driver.window.prompts = Answers()
+        driver.window.prompts.files = [file]
+        assert driver.window.commands.run("head.like")
+        driver.wait_until_idle()
+    finally:
+        driver.close()
+    assert asked == [file, file]
 
 
 def test_what_a_hand_turned_is_written_down_with_its_value(tmp_path, monkeypatch) -> None:
