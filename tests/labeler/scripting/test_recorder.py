@@ -65,7 +65,9 @@ ACTION_STEPS = {
     **dict.fromkeys(("view.cut_open",), "action"),
     **dict.fromkeys(("view.reset", "view.zoom_to_point", "view.projection", "view.slices_visible"), "action"),
     **{id: "action" for id in ACTIONS if id.startswith(("view.plane_", "view.frame", "view.straight"))},
-    **dict.fromkeys(("head.straighten", "head.by_landmarks", "head.take_planes"), "set_head_frame"),
+    **dict.fromkeys(
+        ("head.straighten", "head.like", "head.by_landmarks", "head.take_planes"), "set_head_frame"
+    ),
     **dict.fromkeys(("head.midline", "head.left", "head.right", "head.take_mid_plane"), "set_head_frame"),
     "head.by_hand": "action",
     "head.confirm_left": "confirm_left",
