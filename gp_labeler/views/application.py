@@ -18,6 +18,7 @@ from gp_core.errors import GpError
 from gp_core.resources import resource_path
 from gp_labeler.document.paths import default_directory
 from gp_labeler.document.recovery import find_recoveries, unreadable_journals
+from gp_labeler.imaging.memory import share_freed_memory
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.system.installation import check_display
 from gp_labeler.system.plain_numbers import use_plain_numbers
@@ -84,6 +85,7 @@ def make_window(directory: Path | None = None, *, atlas: bool = True) -> MainWin
     atlas : bool
         Whether to load the atlas chosen last, else the published one, for ghosts.
     """
+    share_freed_memory()
     collect_on_this_thread(make_application())
     describe_widgets()
     importlib.import_module("scipy.ndimage")  # the scene needs it; no job may be importing SciPy meanwhile

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import subprocess
 import sys
 from pathlib import Path
 
@@ -39,3 +41,34 @@ def test_it_is_asked_for_once_after_a_scan_has_come_or_gone(qtbot, make_window, 
     window.workspace.document.begin()
     assert not asked
     qtbot.waitUntil(lambda: bool(asked))
+
+
+ALLOCATING = """
+import ctypes, sys, threading
+from gp_labeler.imaging.memory import share_freed_memory
+if sys.argv[1] == "shared":
+    share_freed_memory()
+together, kept = threading.Barrier(4), []
+def allocate():
+    together.wait()
+    kept.append(ctypes.create_string_buffer(50_000))
+    together.wait()
+threads = [threading.Thread(target=allocate) for _ in range(4)]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+ctypes.CDLL(None).malloc_stats()
+"""
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux" or not hasattr(ctypes.CDLL(None), "malloc_stats"), reason="only glibc has it"
+)
+def test_all_threads_allocate_in_one_place() -> None:
+    places = {}
+    for how in ("shared", "apart"):
+        command = [sys.executable, "-c", ALLOCATING, how]
+        places[how] = subprocess.run(command, capture_output=True, text=True, check=True).stderr.count(
+            "Arena "
+        )
+    assert places["shared"] == 1
+    assert places["apart"] > 1
