@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.distance_field import DistanceField
+from gp_labeler.head_pose.holder import without_holders
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 
@@ -55,6 +56,9 @@ _FEWEST_NOISY = 0.1
 
 _RING_VOXELS = 8.0
 """How far around a voxel its slice tells what it would be without a ring, or a wider shade."""
+
+_BLURRED_VOXELS = 2
+"""How far what is left out brightens its surroundings."""
 
 _EDGE_VOXELS = 1.0
 """How near to the edge of the scan bone is cut by it."""
@@ -125,6 +129,13 @@ class CoarseScan:
             i, j, k = np.clip(index, 0, size - 1).T
             there &= self.measured[k, j, i]
         return np.asarray(there)
+
+    def without(self, part: _Mask) -> CoarseScan:
+        """Return the scan as if a part, and what it blurs into, had not been measured."""
+        from scipy.ndimage import binary_dilation
+
+        measured = np.ones(part.shape, dtype=bool) if self.measured is None else self.measured
+        return replace(self, measured=measured & ~binary_dilation(part, iterations=_BLURRED_VOXELS))
 
     def sampled(self, values: _Values, points: FloatArray) -> FloatArray:
         """Return values of the grid at points (N, 3), interpolated."""
@@ -301,6 +312,8 @@ class Bone:
         from scipy.ndimage import label
 
         above = scan.grid > threshold
+        if scan.measured is not None:
+            above &= scan.measured
         numbers, n = label(above, structure=np.ones((3, 3, 3)))
         sizes = np.bincount(numbers.ravel(), minlength=n + 1)
         sizes[0] = 0
@@ -404,6 +417,7 @@ def bone_of(volume: Volume, threshold: float | None = None) -> tuple[Bone, Bone]
     GpError
         There is no contrast, or hardly any bone.
     """
-    fine, coarse = (coarse_scan(volume, factor * finest_step(volume)) for factor in (1.0, COARSER))
     level = propose_threshold(volume) if threshold is None else threshold
-    return Bone.islands(fine, level)[0], Bone.islands(coarse, level)[0]
+    copies = (coarse_scan(volume, factor * finest_step(volume)) for factor in (1.0, COARSER))
+    fine, coarse = (Bone.islands(without_holders(copy, (level,)), level)[0] for copy in copies)
+    return fine, coarse

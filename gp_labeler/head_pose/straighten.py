@@ -22,6 +22,7 @@ from gp_labeler.head_pose.bone import (
     threshold_candidates,
 )
 from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values, uncertainty_deg
+from gp_labeler.head_pose.holder import without_holders
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import Agreement, agreement_of, search_planes
 from gp_labeler.head_pose.result import MOST_DEG, Confidence, HeadPose, HeadPoseError, SeveralHeadsError
@@ -172,7 +173,12 @@ def _mid_plane(
 ) -> _Found:
     """Return the first plane without a warning, else the least uncertain, over thresholds and islands."""
     tried: list[_Found] = []
-    for islands in _islands_at(_levels(coarse) if threshold is None else (threshold,), fine, coarse):
+    levels = _levels(coarse) if threshold is None else (threshold,)
+    is_one_copy = coarse is fine
+    coarse = without_holders(coarse, levels)
+    fine = coarse if is_one_copy else without_holders(fine, levels)
+    levels = _levels(coarse) if threshold is None else (threshold,)
+    for islands in _islands_at(levels, fine, coarse):
         heads, apart = _separate_heads(islands, report)
         if len(heads) > 1 and meant is None:
             raise SeveralHeadsError([head.bone.centre for head in heads], file=volume.path)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -27,6 +28,7 @@ from gp_labeler.head_pose import (
 from gp_labeler.head_pose.bone import Bone, bone_of, coarse_scan, indices_of, threshold_above
 from gp_labeler.head_pose.distance_field import DistanceField
 from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values, uncertainty_deg
+from gp_labeler.head_pose.holder import sameness_along_axis
 from gp_labeler.head_pose.result import DOUBTFUL_DEG
 from gp_labeler.head_pose.template import front_and_up
 from gp_labeler.imaging.progress import Cancelled, Report
@@ -206,6 +208,28 @@ def test_a_holder_as_bright_as_bone_never_gives_a_wrong_plane(holder):
     except HeadPoseError:
         return
     assert errors(pose, phantom)[0] < 3.0
+
+
+def test_a_cradle_that_lies_askew_does_not_pull_at_the_plane():
+    """Nearly half of the surface is the cradle's, which is symmetric about another plane."""
+    turn = HeadVariation.drawn(474, ["turn"]).turn
+    phantom = head(474, USUAL, turn, holder="cradle")
+    assert errors(straighten(phantom.volume), phantom)[0] < 0.4
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (25.0, -40.0, 70.0)])
+def test_what_is_extruded_is_the_same_along_its_axis_and_a_head_is_not(turn):
+    axes = [np.linspace(-1, 1, n) * 0.5 * (n - 1) for n in (60, 60, 60)]
+    places = (
+        np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        @ Rotation.from_rotvec(turn, degrees=True).as_matrix()
+    )
+    across = np.linalg.norm(places[..., :2] - (0.0, 4.0), axis=-1)
+    half_tube = (across > 14) & (across < 17) & (places[..., 1] < 4) & (np.abs(places[..., 2]) < 22)
+    scan = coarse_scan(Volume(half_tube.astype(np.float32), np.eye(4)), 1.0)
+    assert sameness_along_axis(scan, half_tube) > 0.8
+    bone = bone_of(head(names=USUAL).volume)[1]
+    assert sameness_along_axis(bone.scan, bone.mask) < 0.5
 
 
 def test_half_a_head_is_refused_and_points_are_asked_for():
