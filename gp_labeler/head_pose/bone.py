@@ -130,6 +130,26 @@ class CoarseScan:
             there &= self.measured[k, j, i]
         return np.asarray(there)
 
+    def islands_above(self, level: float) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return which island above a grey value each measured voxel is of, and how many voxels each has.
+
+        Returns
+        -------
+        numbers : (nz, ny, nx) int array
+            0 outside all islands.
+        sizes : (n + 1,) int array
+            Of island 0, that is none, 0.
+        """
+        from scipy.ndimage import label
+
+        above = self.grid > level
+        if self.measured is not None:
+            above &= self.measured
+        numbers, n = label(above, structure=np.ones((3, 3, 3)))
+        sizes = np.bincount(numbers.ravel(), minlength=n + 1)
+        sizes[0] = 0
+        return numbers, sizes
+
     def without(self, part: _Mask) -> CoarseScan:
         """Return the scan as if a part, and what it blurs into, had not been measured."""
         from scipy.ndimage import binary_dilation
@@ -309,18 +329,11 @@ class Bone:
         GpError
             There is hardly any bone.
         """
-        from scipy.ndimage import label
-
-        above = scan.grid > threshold
-        if scan.measured is not None:
-            above &= scan.measured
-        numbers, n = label(above, structure=np.ones((3, 3, 3)))
-        sizes = np.bincount(numbers.ravel(), minlength=n + 1)
-        sizes[0] = 0
+        numbers, sizes = scan.islands_above(threshold)
         large = np.argsort(-sizes)[: np.count_nonzero(sizes >= _SMALLEST_ISLAND * max(int(sizes.max()), 1))]
         if sizes[large].sum() < _FEWEST_VOXELS:
             raise GpError(f"there is almost no bone above {threshold:g}", remedy="Move the threshold.")
-        is_large = np.isin(np.arange(n + 1), large)
+        is_large = np.isin(np.arange(len(sizes)), large)
         together = cls(scan, threshold, is_large[numbers])
         rivals = [i for i in large[:_MOST_ISLANDS] if sizes[i] >= _RIVAL_SHARE * sizes[large[0]]]
         return [together, *(cls(scan, threshold, numbers == i) for i in rivals if len(large) > 1)]

@@ -173,11 +173,7 @@ def _mid_plane(
 ) -> _Found:
     """Return the first plane without a warning, else the least uncertain, over thresholds and islands."""
     tried: list[_Found] = []
-    levels = _levels(coarse) if threshold is None else (threshold,)
-    is_one_copy = coarse is fine
-    coarse = without_holders(coarse, levels)
-    fine = coarse if is_one_copy else without_holders(fine, levels)
-    levels = _levels(coarse) if threshold is None else (threshold,)
+    fine, coarse, levels = _without_holders(fine, coarse, threshold)
     for islands in _islands_at(levels, fine, coarse):
         heads, apart = _separate_heads(islands, report)
         if len(heads) > 1 and meant is None:
@@ -194,6 +190,20 @@ def _mid_plane(
     if accepted:
         return min(accepted, key=lambda found: found.confidence.uncertainty_deg)
     raise HeadPoseError(_why(max(tried, key=lambda f: f.confidence.agreement)), file=volume.path)
+
+
+def _without_holders(
+    fine: CoarseScan, coarse: CoarseScan, threshold: float | None
+) -> tuple[CoarseScan, CoarseScan, tuple[float, ...]]:
+    """Return both copies without holders, and the thresholds to try, which holders are not asked about."""
+
+    def levels_in(scan: CoarseScan) -> tuple[float, ...]:
+        return _levels(scan) if threshold is None else (threshold,)
+
+    with_holders = levels_in(coarse)
+    bare = without_holders(coarse, with_holders)
+    finer = bare if fine is coarse else without_holders(fine, with_holders)
+    return finer, bare, with_holders if bare is coarse else levels_in(bare)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,9 @@ from pathlib import Path
 
 __all__ = ["available_memory", "group_memory", "return_freed_memory", "share_freed_memory"]
 
+_ARENA_MAX = -8
+"""The option of `mallopt` for the number of places in which threads allocate, in glibc's ``malloc.h``."""
+
 _GROUP_FILES = {
     1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_"),
     2: ("memory.max", "memory.current", ""),
@@ -87,10 +90,6 @@ def share_freed_memory() -> None:
     set_option = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if set_option is not None:
         set_option(_ARENA_MAX, 1)
-
-
-_ARENA_MAX = -8
-"""The option of `mallopt` for the number of such places, in glibc's ``malloc.h``."""
 
 
 def return_freed_memory() -> None:

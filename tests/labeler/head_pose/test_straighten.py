@@ -28,7 +28,7 @@ from gp_labeler.head_pose import (
 from gp_labeler.head_pose.bone import Bone, bone_of, coarse_scan, indices_of, threshold_above
 from gp_labeler.head_pose.distance_field import DistanceField
 from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values, uncertainty_deg
-from gp_labeler.head_pose.holder import sameness_along_axis
+from gp_labeler.head_pose.holder import sameness_along_axis, without_holders
 from gp_labeler.head_pose.result import DOUBTFUL_DEG
 from gp_labeler.head_pose.template import front_and_up
 from gp_labeler.imaging.progress import Cancelled, Report
@@ -230,6 +230,18 @@ def test_what_is_extruded_is_the_same_along_its_axis_and_a_head_is_not(turn):
     assert sameness_along_axis(scan, half_tube) > 0.8
     bone = bone_of(head(names=USUAL).volume)[1]
     assert sameness_along_axis(bone.scan, bone.mask) < 0.5
+
+
+@pytest.mark.parametrize("kind", ["nothing", "specks", "a sheet", "a line"])
+def test_what_is_too_small_or_too_thin_to_be_a_holder_stays(kind):
+    grid = np.zeros((40, 40, 40), np.float32)
+    if kind == "specks":
+        grid[np.random.default_rng(0).random(grid.shape) < 0.003] = 1000
+    elif kind != "nothing":
+        grid[(5,) if kind == "a sheet" else (5, 5)] = 1000
+        grid[15:20, 15:20, 15:20] = 1000
+    scan = coarse_scan(Volume(grid, np.eye(4)), 1.0)
+    assert without_holders(scan, (500.0,)) is scan
 
 
 def test_half_a_head_is_refused_and_points_are_asked_for():
