@@ -14,7 +14,8 @@ import ctypes
 import mmap
 import sys
 import threading
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, Final
 
 import numpy as np
@@ -80,8 +81,8 @@ class GuardedMap:
         self._map = mmap.mmap(fileno, length, access=mmap.ACCESS_READ)
         self._length = length
         self._start = int(np.frombuffer(self._map, np.uint8).ctypes.data)
-        if page_by_page and hasattr(mmap, "MADV_RANDOM"):
-            self._map.madvise(mmap.MADV_RANDOM)
+        self._usual_advice = "MADV_RANDOM" if page_by_page else "MADV_NORMAL"
+        self._advise(self._usual_advice)
         end = self._start + -(-length // mmap.PAGESIZE) * mmap.PAGESIZE
         self.__array_interface__ = {
             "data": (self._start, True),
@@ -117,6 +118,20 @@ class GuardedMap:
         if hasattr(mmap, "MADV_WILLNEED") and end > begin:
             with suppress(OSError, ValueError):
                 self._map.madvise(mmap.MADV_WILLNEED, begin, end - begin)
+
+    @contextmanager
+    def page_by_page(self) -> Iterator[None]:
+        """Have the system read no more than the pages that are asked for, until the context ends."""
+        self._advise("MADV_RANDOM")
+        try:
+            yield
+        finally:
+            self._advise(self._usual_advice)
+
+    def _advise(self, advice: str) -> None:
+        """Tell the system how the file will be read, where it can be told."""
+        if hasattr(mmap, advice):
+            self._map.madvise(getattr(mmap, advice))
 
     def close(self) -> None:
         """Let go of the file; raises no error where arrays still hold it."""

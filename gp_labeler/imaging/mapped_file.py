@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import mmap
 import os
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,9 @@ def can_map() -> bool:
 
 _LEAST_AHEAD, _MOST_AHEAD = 1 << 16, 1 << 28
 """Bytes that are worth it, and that the system's cache can take at once."""
+
+_FAR_APART = 16
+"""A part is sparse if the file has so many times its pages from its beginning to its end."""
 
 
 class MappedFile:
@@ -90,6 +95,26 @@ class MappedFile:
         low, high = byte_bounds(part)
         if part.nbytes >= _LEAST_AHEAD and high - low <= min(2 * part.nbytes, _MOST_AHEAD):
             self._map.fetch(low, high - low)
+
+    def is_sparse(self, part: NDArray[Any]) -> bool:
+        """Return whether a part takes few pages, far from each other.
+
+        Parameters
+        ----------
+        part : array
+            A view of `array`.
+        """
+        low, high = byte_bounds(part)
+        in_a_row = part.shape[-1] if part.strides[-1] == part.itemsize else 1
+        pages = part.size / in_a_row * (in_a_row * part.itemsize + mmap.PAGESIZE)
+        return bool(high - low > _FAR_APART * pages)
+
+    def page_by_page(self) -> AbstractContextManager[None]:
+        """Return a context in which the system reads no more than the pages that are asked for.
+
+        A sparse part takes a thousand of them; the system would read ahead after each, and so the whole file.
+        """
+        return self._map.page_by_page()
 
     @property
     def problem(self) -> str | None:

@@ -6,6 +6,7 @@ import math
 import mmap
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -229,6 +230,11 @@ class MappedVoxels(Voxels):
             self._stored[k : k + n, :, x][step, step].copy()
         self._pages_read.add(self._page_of(x))
 
+    @property
+    def _is_mostly_unread(self) -> bool:
+        """Whether the file is large, and no slice has brought all of its rows into memory."""
+        return self._slice_bytes > _MOST_AT_ONCE and not self._pages_read
+
     def _page_of(self, x: int) -> int:
         """Return in which page of its row a voxel lies: whoever reads it has its neighbours, too."""
         return x * self.dtype.itemsize // mmap.PAGESIZE
@@ -236,9 +242,17 @@ class MappedVoxels(Voxels):
     def read(self, k: slice, j: slice, i: slice) -> GreyArray:
         """Return the values of a box: a view of the map where nothing has to be changed."""
         values = self._stored[k, j, i]
-        if self._file is not None:
+        if self._file is not None and self._is_mostly_unread and self._file.is_sparse(values):
+            with self._file.page_by_page():
+                values = values.copy()
+        elif self._file is not None:
             self._file.fetch(values)
         return self._converted(values, [fill.part(j, i) for fill in self._fills])
+
+    def rows(self, n: int) -> GreyArray:
+        """Return the values of about `n` voxels at most; no other rows are read of the file."""
+        with nullcontext() if self._file is None else self._file.page_by_page():
+            return super().rows(n)
 
     def at(self, k: _Index, j: _Index, i: _Index) -> GreyArray:
         """Return the values of single voxels."""

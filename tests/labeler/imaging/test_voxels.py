@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import mmap
 import os
 import signal
 import subprocess
@@ -17,6 +19,7 @@ from gp_core.errors import GpError
 from gp_labeler.imaging import readers, voxels
 from gp_labeler.imaging.bone_distance import bone_distances
 from gp_labeler.imaging.histogram import histogram_of
+from gp_labeler.imaging.mapped_file import MappedFile
 from gp_labeler.imaging.progress import Cancelled, Report
 from gp_labeler.imaging.readers import VolumeError, read_volume
 from gp_labeler.imaging.surface import extract_isosurface
@@ -300,6 +303,49 @@ def test_a_slice_that_takes_long_is_coarse_at_first_and_whole_once_it_was_read(
     after = slicer.image(*planes[Plane.SAGITTAL], at_once=True)
     assert after.unread is None
     np.testing.assert_array_equal(after.values, fine.values)
+
+
+def pages_held(path: Path) -> int:
+    """Return how many pages of a file the system has in memory."""
+    held = np.memmap(path, np.uint8, "r")
+    pages = np.zeros(-(-held.size // mmap.PAGESIZE), np.uint8)
+    libc = ctypes.CDLL(None, use_errno=True)
+    address, size, out = (
+        ctypes.c_void_p(held.ctypes.data),
+        ctypes.c_size_t(held.size),
+        ctypes.c_void_p(pages.ctypes.data),
+    )
+    assert libc.mincore(address, size, out) == 0
+    return int((pages & 1).sum())
+
+
+def left_on_disk(path: Path) -> None:
+    """Have the system forget what it holds of a file; skip where it cannot."""
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+        os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+    if pages_held(path):
+        pytest.skip("this file system keeps files in memory")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux what it holds of a file")
+@pytest.mark.parametrize("what", ["sample", "first look", "coronal"])
+def test_a_few_rows_bring_no_more_of_a_file_than_their_own_pages(
+    tmp_path: Path, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(voxels, "_MOST_AT_ONCE", 1)
+    path, n_voxels = tmp_path / "scan.raw", 1 << 25
+    path.write_bytes(bytes(2 * n_voxels))
+    left_on_disk(path)
+    file = MappedFile(path, 2 * n_voxels)
+    scan = MappedVoxels(file.array(np.dtype(np.int16), 0, (128, 512, 512)), file=file)
+    if what == "sample":
+        n_rows = len(scan.rows(20_000)) // 512
+    elif what == "first look":
+        n_rows = scan.read(slice(None, None, 16), slice(None, None, 16), slice(100, 101)).copy().size
+    else:
+        n_rows = len(scan.read(slice(None), slice(200, 201), slice(None)).copy())
+    assert n_rows <= pages_held(path) <= 2 * n_rows
 
 
 class InParts(ArrayVoxels):
