@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from gp_core.validation import FloatArray
 
-__all__ = ["MidPlane"]
+__all__ = ["MidPlane", "hemisphere"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,3 +56,12 @@ class MidPlane:
     def angle_to_deg(self, other: MidPlane) -> float:
         """Return the angle between two planes, 0 to 90 degrees."""
         return float(np.degrees(np.arccos(min(1.0, abs(float(self.normal @ other.normal))))))
+
+
+def hemisphere(n: int) -> FloatArray:
+    """Return n unit vectors (n, 3), evenly spread over half a sphere."""
+    i = np.arange(n) + 0.5
+    z = i / n
+    turn = np.pi * (1 + np.sqrt(5)) * i
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)

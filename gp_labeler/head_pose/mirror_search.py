@@ -14,7 +14,7 @@ import numpy as np
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.bone import Bone
 from gp_labeler.head_pose.distance_field import CLIP
-from gp_labeler.head_pose.mid_plane import MidPlane
+from gp_labeler.head_pose.mid_plane import MidPlane, hemisphere
 from gp_labeler.imaging.progress import Report
 
 __all__ = ["Agreement", "agreement_of", "refined_by_points", "search_planes"]
@@ -87,7 +87,7 @@ def distinct(planes: list[MidPlane], apart_deg: float) -> list[MidPlane]:
 
 def _scored_on_grid(bone: Bone, report: Report) -> list[MidPlane]:
     offsets = np.arange(-_REACH, _REACH + 1e-9, _STEP / CLIP) * bone.radius
-    normals = _hemisphere(_N_NORMALS)
+    normals = hemisphere(_N_NORMALS)
     first = [_best_offset(bone, normal, offsets, _N_FEW_POINTS)[0] for normal in normals]
     report(0.4)
     scored = []
@@ -108,15 +108,6 @@ def _best_offset(bone: Bone, normal: FloatArray, offsets: FloatArray, n_points: 
     score = field.means(field.indices(points) - 2 * (heights - offsets[:, None])[..., None] * step)
     best = int(score.argmin())
     return float(score[best]), float(offsets[best])
-
-
-def _hemisphere(n: int) -> FloatArray:
-    """Return n unit vectors (n, 3), evenly spread over half a sphere."""
-    i = np.arange(n) + 0.5
-    z = i / n
-    turn = np.pi * (1 + np.sqrt(5)) * i
-    r = np.sqrt(1 - z * z)
-    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
 
 
 def refined_by_points(

@@ -291,6 +291,7 @@ class HeadModel:
     def confirm_left(self) -> None:
         """Keep that a person knows left to be left."""
         self._document.do(ConfirmLeft())
+        self._messages.say("Left is confirmed", "info")
 
     def reopen_mirrored(self) -> None:
         """Read the scan again with its slices in reverse order, as a new specimen; straighten it if it was.

@@ -206,7 +206,10 @@ def test_left_is_asked_once_and_the_answer_is_kept(workspace, monkeypatch) -> No
     straightened(workspace, monkeypatch)
     assert workspace.head.asks_left
     assert "nothing in the scan can prove it" in workspace.head.left_text
+    said = []
+    workspace.messages.said.connect(lambda text, level: said.append(text))
     workspace.head.confirm_left()
+    assert said == ["Left is confirmed"]  # and no longer asked for
     assert not workspace.head.asks_left
     straightened(workspace, monkeypatch)  # again: left is no other
     assert not workspace.head.asks_left
