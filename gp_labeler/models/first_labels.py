@@ -129,6 +129,8 @@ class FirstLabelsModel:
             threshold=self._document.state.threshold,
             atlas=self._atlas.expected_by,
         )
+        if left_confirmed and self._head.asks_left:
+            self._head.confirm_left()
         self._jobs.submit(job, partial(self._take, job.labelled, left_confirmed), key=_KEY)
 
     def cancel(self) -> None:

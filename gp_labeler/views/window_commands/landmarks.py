@@ -119,8 +119,6 @@ def _knows_left(workspace: Workspace, prompts: Prompts) -> bool:
     if answer == MIRRORED:
         ask_reopen_mirrored(workspace, prompts)
         return False
-    if answer and workspace.head.asks_left:
-        workspace.head.confirm_left()
     return bool(answer)
 
 

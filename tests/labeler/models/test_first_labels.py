@@ -12,10 +12,13 @@ from small_heads import TURN, save_markups, save_volume, small_head
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
 from gp_labeler.autolabel import Guess, Proposal
 from gp_labeler.autolabel.registration_process import ProcessRegistration
 from gp_labeler.commands.actions import ACTIONS
+from gp_labeler.document.head_edits import SetHeadFrame
+from gp_labeler.document.head_frame import HeadFrame
 from gp_labeler.head_pose.result import HeadPoseError
 from gp_labeler.imaging.progress import Cancelled
 from gp_labeler.jobs.first_labels import SuggestFromScans
@@ -172,3 +175,12 @@ def test_what_cannot_be_suggested_is_said(workspace, tmp_path):
         Workspace().first_labels.suggest([tmp_path])
     assert ACTIONS["point.suggest_like"].enabled(made)
     assert not ACTIONS["point.suggest_like"].enabled(Workspace())
+
+
+def test_left_is_not_asked_again_once_it_was_said_for_the_suggestions(workspace):
+    made, _ = workspace
+    made.document.do(SetHeadFrame(HeadFrame.of(RigidTransform(np.eye(4), dst="head", src="scan"))))
+    made.first_labels.suggest(["none"])
+    assert made.head.asks_left
+    made.first_labels.suggest(["none"], left_confirmed=True)
+    assert not made.head.asks_left
