@@ -71,9 +71,9 @@ def heads_of(kind: str, seeds: list[int]) -> list[LabelledScan]:
     return phantoms(range(1, 6) if kind == "dev-phantoms" else seeds, kind == "varied")
 
 
-def true_pose(scan: LabelledScan, template: Template) -> np.ndarray:
-    """Return the rotation from a template to a head, by their landmarks."""
-    names = tuple(name for name in template.points if name in scan.points)
+def true_pose(scan: LabelledScan, template: Template, names: Iterable[str]) -> np.ndarray:
+    """Return the rotation from a template to a head, by some of the landmarks that both have."""
+    names = tuple(name for name in names if name in template.points)
     here = np.array([scan.points[name] for name in names])
     weights = np.full(len(names), 1 / len(names))
     return fit_similarity(template.array(names), here, weights, (0.5, 2.0)).rotation
@@ -132,6 +132,12 @@ def spoiled(scan: LabelledScan, kind: str, rng: np.random.Generator) -> Volume:
     return Volume(array.astype(np.float32), turn @ affine, name=volume.name, fill=fill)
 
 
+def measured_points(volume: Volume, points: dict[str, np.ndarray]) -> list[str]:
+    """Return the names of the points that lie in a scan, and not in its fill."""
+    inside = [name for name, xyz in points.items() if volume.contains(xyz[None])[0]]
+    return [name for name in inside if volume.values_at(points[name][None])[0] != volume.fill]
+
+
 def run_pose(heads: list[LabelledScan], args: argparse.Namespace) -> None:
     """Find poses of heads turned at random, and write a line each."""
     library = TemplateLibrary(heads, args.out / "kept")
@@ -148,7 +154,8 @@ def run_pose(heads: list[LabelledScan], args: argparse.Namespace) -> None:
         spoilt = spoiled(scan, kind, rng)
         moved = spoilt.T_scan_voxel[:3, :3] / spoilt.spacing
         back = volume.T_scan_voxel[:3, :3] / volume.spacing
-        truth = moved @ back.T @ true_pose(scan, template)
+        turn_matrix = moved @ back.T
+        in_scan = measured_points(spoilt, {name: turn_matrix @ xyz for name, xyz in scan.points.items()})
         start = time.process_time()
         found = find_pose(spoilt, template.surface)
         line = {
@@ -156,7 +163,9 @@ def run_pose(heads: list[LabelledScan], args: argparse.Namespace) -> None:
             "turn": turn,
             "kind": kind,
             "template": template.name,
-            "deg": angle_deg(found.fit.rotation, truth),
+            "deg": angle_deg(found.fit.rotation, turn_matrix @ true_pose(scan, template, scan.points)),
+            "deg_in_scan": angle_deg(found.fit.rotation, turn_matrix @ true_pose(scan, template, in_scan)),
+            "in_scan": len(in_scan),
             "score": found.score,
             "lead": found.rival - found.score,
             "seen": found.seen,
@@ -175,6 +184,7 @@ def tell_poses(lines: list[dict]) -> None:
     for kind in dict.fromkeys(line["kind"] for line in lines):
         own = [line for line in lines if line["kind"] == kind]
         deg = np.array([line["deg"] for line in own])
+        in_scan = np.array([line["deg_in_scan"] for line in own])
         certain = np.array([line["certain"] for line in own])
         accepted = np.array([line["accepted"] for line in own])
         print(
@@ -182,7 +192,8 @@ def tell_poses(lines: list[dict]) -> None:
             f"{deg[certain].max(initial=0):5.1f} deg), uncertain {(accepted & ~certain).sum():3d} (worst "
             f"{deg[accepted & ~certain].max(initial=0):5.1f} deg), refused {(~accepted).sum():3d}, "
             f"of which wrong {(deg[~accepted] > 20).sum():3d};  accepted > 20 deg: "
-            f"{(deg[accepted] > 20).sum()}, > 5 deg: {(deg[accepted] > 5).sum()};  "
+            f"{(deg[accepted] > 20).sum()}, > 5 deg: {(deg[accepted] > 5).sum()} (by landmarks in the scan: "
+            f"{(in_scan[accepted] > 5).sum()}, worst {in_scan[accepted].max(initial=0):.1f});  "
             f"CPU {np.mean([line['cpu'] for line in own]):.1f} s"
         )
 
