@@ -44,17 +44,19 @@ import numpy as np  # noqa: E402
 from gp_core.errors import GpError  # noqa: E402
 from gp_core.io import load_specimens  # noqa: E402
 from gp_core.landmarks.features import FEATURES, Side, feature  # noqa: E402
-from gp_labeler.document.state import How  # noqa: E402
 from gp_labeler.scene.planes import Plane  # noqa: E402
-from gp_labeler.scripting.events import click, press_keys, turn_wheel  # noqa: E402
-from gp_labeler.scripting.page_correction import pointing_at  # noqa: E402
-from gp_labeler.scripting.steps.first_labels import PATIENCE_SECONDS  # noqa: E402
-from gp_labeler.scripting.steps.scan import Open  # noqa: E402
-from gp_labeler.scripting.window_driver import WindowDriver  # noqa: E402
-from gp_labeler.views.panels.label.close_view_tile import CloseViewTile  # noqa: E402
-from gp_labeler.views.panels.label.suggest_row import SuggestRow  # noqa: E402
-from gp_labeler.views.panels.label.suggestion_page_dialog import SuggestionPageDialog  # noqa: E402
-from gp_labeler.views.window_commands.landmarks import AS_THE_FILE, FOLDER  # noqa: E402
+
+if __name__ == "__main__":  # the registration process imports this file, too: no window is part of its memory
+    from gp_labeler.document.state import How
+    from gp_labeler.scripting.events import click, press_keys, turn_wheel
+    from gp_labeler.scripting.page_correction import pointing_at
+    from gp_labeler.scripting.steps.first_labels import PATIENCE_SECONDS
+    from gp_labeler.scripting.steps.scan import Open
+    from gp_labeler.scripting.window_driver import WindowDriver
+    from gp_labeler.views.panels.label.close_view_tile import CloseViewTile
+    from gp_labeler.views.panels.label.suggest_row import SuggestRow
+    from gp_labeler.views.panels.label.suggestion_page_dialog import SuggestionPageDialog
+    from gp_labeler.views.window_commands.landmarks import AS_THE_FILE, FOLDER
 
 _SLICES = tuple(plane.value for plane in Plane)
 _VOXEL_PIXELS = 4.0
