@@ -21,7 +21,7 @@ from gp_labeler.imaging.mesh import Surface, SurfaceHit
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.threshold import volume_level
 from gp_labeler.imaging.volume import GreyArray, Volume
-from gp_labeler.imaging.vtk_arrays import narrow_cells, to_numpy, to_vtk, triangles_of
+from gp_labeler.imaging.vtk_arrays import narrow_cells, poly_data, to_numpy, to_vtk, triangles_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -231,15 +231,19 @@ def _flying_edges(image: pv.ImageData, level: float) -> pv.PolyData:
 
     It is not stopped in the middle: aborted, it goes on with counts that it has not made (VTK 9.7).
     """
+    from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D  # not before the window shows
+
+    contour = vtkFlyingEdges3D()
+    contour.SetInputData(image)
+    contour.SetValue(0, level)
+    contour.ComputeScalarsOff()
     vtkSMPTools.SetBackend("STDThread")  # the wheel's default is one thread
     vtkCellArray.SetDefaultStorageIs64Bit(False)  # what other threads make meanwhile is as good
     try:
-        mesh: pv.PolyData = image.contour(
-            [level], method="flying_edges", compute_normals=True, compute_scalars=False, preference="point"
-        )
+        contour.Update()
     finally:
         vtkCellArray.SetDefaultStorageIs64Bit(True)
-    return mesh
+    return poly_data(contour.GetOutput())
 
 
 def _marching_cubes(image: pv.ImageData, level: float) -> pv.PolyData:
