@@ -157,6 +157,8 @@ class RawSource:
                     )
                 position = start + len(buffer)
                 yield self.finish(stored)
+            if isinstance(stream, _Unpacked) and self.offset + position == self.bytes_needed:
+                stream.compare_checksum(self.plane_bytes)
 
 
 @dataclass(frozen=True)
@@ -307,15 +309,31 @@ class _Unpacked(io.RawIOBase):
                 if not self._packed.strip(b"\0"):
                     return 0
                 self._piece = self._unpacker()
-            full = not getattr(self._piece, "needs_input", True)  # bz2 keeps what it could not give out yet
-            packed = b"" if full else self._packed or self._file.read(_CHUNK) or b""
-            data = self._piece.decompress(packed, len(buffer))
-            self._packed = getattr(self._piece, "unconsumed_tail", b"")
+            data, goes_on = self._unpack(len(buffer))
             if data:
                 buffer[: len(data)] = data
                 return len(data)
-            if not packed and not self._piece.eof:
+            if not goes_on:
                 return 0  # it ends early; whoever reads finds the plane short
+
+    def compare_checksum(self, within: int) -> None:
+        """Go on to the end of a piece all of which was read: unpacking compares the checksum that is there.
+
+        Bytes that changed on the way may unpack to others without any error; only the checksum tells. A piece
+        that goes on for more than `within` bytes holds more than was asked for, and is not compared.
+        """
+        goes_on = True
+        while goes_on and not self._piece.eof and within >= 0:
+            data, goes_on = self._unpack(_CHUNK)
+            within -= len(data)
+
+    def _unpack(self, most: int) -> tuple[bytes, bool]:
+        """Return the next bytes, so many at most, and whether any may follow."""
+        full = not getattr(self._piece, "needs_input", True)  # bz2 keeps what it could not give out yet
+        packed = b"" if full else self._packed or self._file.read(_CHUNK) or b""
+        data = self._piece.decompress(packed, most)
+        self._packed = getattr(self._piece, "unconsumed_tail", b"")
+        return data, bool(packed) or full or self._piece.eof
 
     def close(self) -> None:
         self._file.close()

@@ -417,6 +417,18 @@ def test_a_short_file_is_named_with_its_bytes(name: str, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("name", ["packed.mha", "gzip.nrrd", "packed.nii.gz"])
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_a_packed_file_in_which_bytes_changed_is_refused(name: str, share: float, tmp_path: Path) -> None:
+    path = WRITERS[name](cropped(), tmp_path / name)
+    content = bytearray(path.read_bytes())
+    at = int(share * len(content))
+    content[at : at + 40] = bytes(40)
+    path.write_bytes(content)
+    with pytest.raises(VolumeError, match=f"{name}: (it ends within slice|it cannot be read)"):
+        read_volume(path)
+
+
+@pytest.mark.parametrize("name", ["packed.mha", "gzip.nrrd", "packed.nii.gz"])
 def test_a_packed_file_that_ends_early_is_refused(name: str, tmp_path: Path) -> None:
     path = WRITERS[name](cropped(), tmp_path / name)
     path.write_bytes(path.read_bytes()[:-20_000])
