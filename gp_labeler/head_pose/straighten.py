@@ -25,7 +25,14 @@ from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_val
 from gp_labeler.head_pose.holder import without_holders
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import Agreement, agreement_of, search_planes
-from gp_labeler.head_pose.result import MOST_DEG, Confidence, HeadPose, HeadPoseError, SeveralHeadsError
+from gp_labeler.head_pose.result import (
+    DOUBTFUL_DEG,
+    MOST_DEG,
+    Confidence,
+    HeadPose,
+    HeadPoseError,
+    SeveralHeadsError,
+)
 from gp_labeler.head_pose.template import HeadTemplate, InPlane, front_and_up, phantom_template
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.volume import Volume
@@ -155,6 +162,11 @@ def _check_together(found: _Found, lying: InPlane, volume: Volume) -> None:
     if any(unclear) and found.bone.scan.is_noisy:
         raise HeadPoseError(
             f"{_FAILED}: in so much noise it is not clear which way is front and up", file=volume.path
+        )
+    if any(unclear) and found.confidence.uncertainty_deg > DOUBTFUL_DEG:
+        raise HeadPoseError(
+            f"{_FAILED}: its parts do not agree on one plane, and the template does not decide",
+            file=volume.path,
         )
     if any(unclear) and found.confidence.margin < _CLEAR[2]:
         raise HeadPoseError(

@@ -1,7 +1,9 @@
 """A head is straightened by its bone or by points, and what cannot be trusted is refused."""
 
 import json
+from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -254,6 +256,21 @@ def test_what_is_too_small_or_too_thin_to_be_a_holder_stays(kind):
         grid[15:20, 15:20, 15:20] = 1000
     scan = coarse_scan(Volume(grid, np.eye(4)), 1.0)
     assert without_holders(scan, (500.0,)) is scan
+
+
+@pytest.mark.parametrize("front_is_clear", [True, False])
+def test_an_uncertain_plane_needs_a_clear_front(front_is_clear, monkeypatch):
+    """A box around one ear of a mouse was accepted 16 degrees off, with two warnings."""
+    module = import_module("gp_labeler.head_pose.straighten")
+    monkeypatch.setattr(module, "uncertainty_deg", lambda *given: 2.0)
+    if not front_is_clear:
+        monkeypatch.setattr(module, "front_and_up", lambda *given: replace(front_and_up(*given), margin=0.0))
+    volume = head(24, turn=(0.0, 0.0, 0.0)).volume
+    if front_is_clear:
+        assert any("uncertain" in warning for warning in straighten(volume).warnings)
+    else:
+        with pytest.raises(HeadPoseError, match=r"its parts do not agree on one plane.*IN and a pair"):
+            straighten(volume)
 
 
 def test_half_a_head_is_refused_and_points_are_asked_for():
