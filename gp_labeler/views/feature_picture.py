@@ -188,6 +188,12 @@ class FeaturePicture(QWidget):
         painter.drawPixmap(0, 0, self._drawn)
         painter.end()
 
+    def finish(self) -> None:
+        """Draw at once what is otherwise drawn a moment later."""
+        if self._drawn_for != self._wanted:
+            self._draw_timer.stop()
+            self._draw()
+
     @property
     def _wanted(self) -> tuple[object, ...]:
         """All that the picture depends on."""

@@ -12,6 +12,7 @@ from qtpy.QtWidgets import QApplication, QWidget
 from gp_core.disk import write_bytes
 from gp_core.errors import GpError
 from gp_labeler.scene.planes import Plane
+from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.scene_view import SceneView
 from gp_labeler.views.slice_view import SliceView
 
@@ -96,9 +97,9 @@ def _slices(views: list[SliceView], size: tuple[int, int] | None) -> QImage:
 
 
 def grab(part: QWidget) -> QPixmap:
-    """Return what a part of the window shows, its 3D views finely drawn."""
+    """Return what a part of the window shows, with all that is drawn a moment later."""
     for view in [part, *part.findChildren(QWidget)]:
-        if isinstance(view, SceneView) and view.isVisible():
+        if isinstance(view, SceneView | FeaturePicture) and view.isVisible():
             view.finish()
     return part.grab()
 

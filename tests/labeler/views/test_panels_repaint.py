@@ -27,6 +27,7 @@ from gp_labeler.views.feature_picture import FeaturePicture, feature_picture
 from gp_labeler.views.panels.label.landmark_table_model import LandmarkTableModel
 from gp_labeler.views.panels.label.panel import LabelPanel
 from gp_labeler.views.panels.pose.touch_table_model import RESIDUAL, TouchTableModel
+from gp_labeler.views.pictures import grab
 from gp_labeler.views.theme import DARK, LIGHT, Theme, apply_theme, theme_of
 
 pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
@@ -220,6 +221,21 @@ def test_the_picture_follows_feature_side_size_and_theme(qtbot):
     qtbot.waitUntil(lambda: shows("IN", RIGHT, LIGHT))
     picture.resize(160, 160)
     qtbot.waitUntil(lambda: shows("IN", RIGHT, LIGHT))
+
+
+def test_what_is_grabbed_has_the_picture_that_is_drawn_a_moment_later(qtbot):
+    picture = FeaturePicture()
+    apply_theme(picture, DARK)
+    qtbot.addWidget(picture)
+    picture.resize(200, 120)
+    picture.show_feature("RWA", LEFT)
+    picture.show()
+    qtbot.waitExposed(picture)
+    for size in (QSize(200, 120), QSize(160, 160)):
+        picture.resize(size)
+        grabbed = pixels(grab(picture))
+        wanted = picture_of("RWA", LEFT, size, DARK, picture.devicePixelRatioF())
+        assert is_same(grabbed[8:-8, 8:-8], wanted[8:-8, 8:-8])  # inside the round corners
 
 
 @pytest.mark.parametrize("side", list(Side))
