@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -194,7 +194,7 @@ def _mid_plane(
             found = _meant_head(heads, apart, meant, islands, report)
             return replace(found, lies_beside=len(apart) > len(heads))
         for bone in islands.searched:
-            found = _best_plane(bone, islands, report)
+            found = islands.plane_of(bone, report)
             tried.append(found)
             if found.accepted and not found.confidence.warnings:
                 return found
@@ -225,10 +225,17 @@ class _Islands:
     searched: list[Bone]
     fine: CoarseScan
     level: float
+    _planes: dict[Bone, _Found] = field(default_factory=dict)
 
     @classmethod
     def above(cls, level: float, fine: CoarseScan, coarse: CoarseScan) -> _Islands:
         return cls(Bone.islands(coarse, level), fine, level)
+
+    def plane_of(self, bone: Bone, report: Report) -> _Found:
+        """Return the best plane of one of the islands searched, which is looked for once."""
+        if bone not in self._planes:
+            self._planes[bone] = _best_plane(bone, self, report)
+        return self._planes[bone]
 
     @cached_property
     def _refined(self) -> list[Bone]:
@@ -266,7 +273,7 @@ def _separate_heads(islands: _Islands, report: Report) -> tuple[list[_Found], li
     """Return the mid-plane of each head beside another large part of bone, and all such parts."""
     rivals = islands.searched[1:]
     apart = [b for b in rivals if any(b.is_apart_from(other) for other in rivals if other is not b)]
-    found = [_best_plane(bone, islands, report) for bone in apart]
+    found = [islands.plane_of(bone, report) for bone in apart]
     return [head for head in found if head.accepted], apart
 
 

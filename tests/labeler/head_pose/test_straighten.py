@@ -31,6 +31,7 @@ from gp_labeler.head_pose.bone import Bone, bone_of, coarse_scan, indices_of, th
 from gp_labeler.head_pose.distance_field import DistanceField
 from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values, uncertainty_deg
 from gp_labeler.head_pose.holder import sameness_along_axis, without_holders
+from gp_labeler.head_pose.mirror_search import search_planes
 from gp_labeler.head_pose.result import DOUBTFUL_DEG
 from gp_labeler.head_pose.template import front_and_up
 from gp_labeler.imaging.progress import Cancelled, Report
@@ -277,6 +278,20 @@ def test_half_a_head_is_refused_and_points_are_asked_for():
     phantom = head(24, turn=(0.0, 0.0, 0.0), crop=(0.65, "L"))
     with pytest.raises(HeadPoseError, match=r"could not be straightened by its symmetry.*IN and a pair"):
         straighten(phantom.volume)
+
+
+def test_each_part_of_the_bone_is_searched_once(monkeypatch):
+    half = head(24, turn=(0.0, 0.0, 0.0), crop=(0.65, "L")).volume
+    module, searched = import_module("gp_labeler.head_pose.straighten"), []
+
+    def search(bone, report):
+        searched.append(bone)
+        return search_planes(bone, report)
+
+    monkeypatch.setattr(module, "search_planes", search)
+    with pytest.raises(HeadPoseError):
+        straighten(Volume(np.concatenate([half.array] * 2, axis=2), half.T_scan_voxel))
+    assert len(searched) == len(set(searched)) > 2
 
 
 def test_a_box_leaves_out_what_is_not_the_head():
